@@ -1,0 +1,32 @@
+# Everything is set up inside .venv; nothing outside the repository is touched.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+CASES ?= $(wildcard ../shared/cases/*/)
+
+.PHONY: demo test check bench clean
+
+$(STAMP): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	touch $@
+
+demo: $(STAMP)
+	$(BIN)/firstfix demo $(DEMO_ARGS)
+
+test: $(STAMP)
+	$(BIN)/python -m pytest -n 2 $(TEST_ARGS)
+
+check: $(STAMP)
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python -m pytest -n 2 -q -m "not slow" $(TEST_ARGS)
+
+bench: $(STAMP)
+	$(BIN)/firstfix bench $(CASES) --method fast --method paper --foreign --json out/bench.json --report out/bench
+
+clean:
+	rm -rf $(VENV) out dist build

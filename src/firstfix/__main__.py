@@ -1,0 +1,5 @@
+"""``python -m firstfix``."""
+
+from firstfix.cli.app import main
+
+main()

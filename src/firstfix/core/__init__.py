@@ -1,0 +1,1 @@
+"""What things are: value types and geometry, on NumPy alone."""

@@ -1,0 +1,76 @@
+"""Angles in radians; the only file that knows 2π."""
+
+from __future__ import annotations
+
+import math
+from typing import overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+FULL_TURN = 2.0 * math.pi
+
+
+@overload
+def wrap(angle: float) -> float: ...
+@overload
+def wrap(angle: NDArray[np.float64]) -> NDArray[np.float64]: ...
+def wrap(angle: float | NDArray[np.float64]) -> float | NDArray[np.float64]:
+    """Bring an angle into (-π, π].
+
+    Parameters
+    ----------
+    angle : float or ndarray
+        Any finite angle, rad.
+
+    Returns
+    -------
+    float or ndarray
+        The same direction in (-π, π]; an array stays an array.
+    """
+    # Turning the interval round moves its closed end to +π, where REP 103 wants it.
+    turned = math.pi - np.remainder(math.pi - np.asarray(angle, np.float64), FULL_TURN)
+    # A tiny negative remainder rounds up to a full turn and would leave exactly -π.
+    wrapped = np.where(turned <= -math.pi, math.pi, turned)
+    return wrapped if isinstance(angle, np.ndarray) else float(wrapped)
+
+
+@overload
+def angle_error(a: float, b: float) -> float: ...
+@overload
+def angle_error(a: NDArray[np.float64], b: float | NDArray[np.float64]) -> NDArray[np.float64]: ...
+def angle_error(
+    a: float | NDArray[np.float64], b: float | NDArray[np.float64]
+) -> float | NDArray[np.float64]:
+    """Angle between two directions, never negative.
+
+    Parameters
+    ----------
+    a, b : float or ndarray
+        Directions, rad.
+
+    Returns
+    -------
+    float or ndarray
+        The shorter way from one to the other, rad, in [0, π].
+    """
+    error = np.abs(wrap(np.asarray(a, np.float64) - np.asarray(b, np.float64)))
+    return error if isinstance(a, np.ndarray) or isinstance(b, np.ndarray) else float(error)
+
+
+def circular_mean(angles: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
+    """Weighted mean direction.
+
+    Parameters
+    ----------
+    angles : ndarray, shape (n,)
+        Directions, rad.
+    weights : ndarray, shape (n,)
+        Non-negative weights; they need not sum to one.
+
+    Returns
+    -------
+    float
+        Mean direction, rad, in (-π, π].
+    """
+    return wrap(math.atan2(float(weights @ np.sin(angles)), float(weights @ np.cos(angles))))

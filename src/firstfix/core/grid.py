@@ -1,0 +1,130 @@
+"""The occupancy grid: what is wall, what is free, what nobody has seen."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.errors import MapError
+from firstfix.core.se2 import SE2
+
+UNKNOWN = -1
+FREE = 0
+OCCUPIED = 100
+
+# SLAM systems publish probabilities in between; these are the thresholds of map_server
+# (occupied_thresh 0.65, free_thresh 0.25) in per cent.
+OCCUPIED_FROM = 65
+FREE_UP_TO = 25
+
+# A float32 distance field of this many cells is 2 GB: larger maps are a mistake or an attack.
+MAX_CELLS = 500_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancyGrid:
+    """A map of square cells, as ``nav_msgs/OccupancyGrid`` means it.
+
+    Parameters
+    ----------
+    cells : ndarray of int8, shape (height, width)
+        -1 unknown, 0 free ... 100 occupied; row 0 is the bottom row. Made read-only.
+    resolution : float
+        Side of a cell, m.
+    T_map_grid : SE2
+        Pose of the lower-left *corner* of cell (0, 0) in the map frame, yaw included.
+
+    Raises
+    ------
+    MapError
+        If the shape, a value or the resolution cannot belong to a map.
+    """
+
+    cells: NDArray[np.int8]
+    resolution: float
+    T_map_grid: SE2 = field(default_factory=SE2.identity)
+
+    def __post_init__(self) -> None:
+        cells = np.ascontiguousarray(self.cells)
+        if cells.ndim != 2 or cells.size == 0:
+            raise MapError(
+                expected="a map of at least one row and one column",
+                received=f"cells of shape {cells.shape}",
+                remedy="check the image or message the map came from",
+            )
+        if cells.size > MAX_CELLS:
+            raise MapError(
+                expected=f"at most {MAX_CELLS} cells",
+                received=f"{cells.shape[1]} x {cells.shape[0]} cells",
+                remedy="crop the map or use a coarser resolution",
+            )
+        if cells.dtype != np.int8 or cells.min() < UNKNOWN or cells.max() > OCCUPIED:
+            raise MapError(
+                expected="int8 cells from -1 (unknown) over 0 (free) to 100 (occupied)",
+                received=f"{cells.dtype} cells from {cells.min()} to {cells.max()}",
+                remedy="convert the map to the values of nav_msgs/OccupancyGrid",
+            )
+        if not (math.isfinite(self.resolution) and self.resolution > 0.0):
+            raise MapError(
+                expected="a resolution above 0 m per cell",
+                received=f"{self.resolution}",
+                remedy="set the side of a cell in metres, such as 0.05",
+            )
+        if cells is self.cells and cells.flags.writeable:
+            cells = cells.copy()
+        cells.flags.writeable = False
+        object.__setattr__(self, "cells", cells)
+        object.__setattr__(self, "resolution", float(self.resolution))
+
+    @property
+    def height(self) -> int:
+        """Number of rows."""
+        return int(self.cells.shape[0])
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return int(self.cells.shape[1])
+
+    @cached_property
+    def occupied(self) -> NDArray[np.bool_]:
+        """Where a wall is, shape (height, width)."""
+        return _read_only(self.cells >= OCCUPIED_FROM)
+
+    @cached_property
+    def free(self) -> NDArray[np.bool_]:
+        """Where a robot can be, shape (height, width)."""
+        return _read_only((self.cells >= FREE) & (self.cells <= FREE_UP_TO))
+
+    @property
+    def free_area(self) -> float:
+        """Area of all free cells, m²."""
+        return float(np.count_nonzero(self.free)) * self.resolution**2
+
+    def to_cells(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Take points of the map frame to continuous cell coordinates.
+
+        Parameters
+        ----------
+        points : ndarray, shape (..., 2)
+            x, y in the map frame, m.
+
+        Returns
+        -------
+        ndarray, shape (..., 2)
+            (column, row) with fractions; the cell itself is the floor of both.
+        """
+        return self.T_map_grid.inverse().apply(points) / self.resolution
+
+    def to_map(self, cells: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Take continuous cell coordinates (column, row), shape (..., 2), to the map frame, m."""
+        return self.T_map_grid.apply(cells * self.resolution)
+
+
+def _read_only(array: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,61 @@
+"""A log of a drive: scans, and what was known beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.errors import ScanError
+from firstfix.core.scan import LaserScan
+from firstfix.core.trajectory import Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Scans in the order of their stamps, whatever file they came from.
+
+    Parameters
+    ----------
+    scans : tuple of LaserScan
+        At least one.
+    odometry : Trajectory or None
+        ``T_odom_base`` over time, where the log has it.
+    truth : ndarray, shape (n_scans, 3), or None
+        ``T_map_base`` at each scan: x (m), y (m), yaw (rad); NaN rows where it is not known.
+    runs : ndarray of int, shape (n_scans,), or None
+        Scans with one number belong to one uninterrupted drive.
+
+    Raises
+    ------
+    ScanError
+        If there is no scan, or truth or runs do not fit the scans.
+    """
+
+    scans: tuple[LaserScan, ...]
+    odometry: Trajectory | None = None
+    truth: NDArray[np.float64] | None = None
+    runs: NDArray[np.int64] | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.scans)
+        if n == 0:
+            raise ScanError(
+                expected="at least one scan",
+                received="an empty log",
+                remedy="check the scan topic or the log",
+            )
+        for name, array, shape in (
+            ("truth", self.truth, (n, 3)),
+            ("runs", self.runs, (n,)),
+        ):
+            if array is not None and array.shape != shape:
+                raise ScanError(
+                    expected=f"{name} of shape {shape} for {n} scans",
+                    received=f"shape {array.shape}",
+                    remedy=f"give one row of {name} for every scan",
+                )
+
+    def __len__(self) -> int:
+        return len(self.scans)

@@ -1,0 +1,150 @@
+"""One sweep of a 2D LIDAR."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from firstfix.core.angles import FULL_TURN
+from firstfix.core.errors import ScanError
+from firstfix.core.se2 import SE2
+
+MAX_BEAMS = 100_000
+
+
+class Mounting(Enum):
+    """Which way up the sensor sits on the robot."""
+
+    UPRIGHT = 1
+    UPSIDE_DOWN = -1
+
+
+@dataclass(frozen=True, eq=False)
+class LaserScan:
+    """A scan as ``sensor_msgs/LaserScan`` means it, with the sensor's place on the robot.
+
+    Parameters
+    ----------
+    ranges : ndarray of float32, shape (n,)
+        Measured distances, m. ``+inf`` or at least ``range_max``: nothing within range (REP 117).
+        NaN, ``-inf``, zero, negative or below ``range_min``: no valid reading. Made read-only.
+    angle_min : float
+        Bearing of the first beam in the sensor frame, rad.
+    angle_increment : float
+        Step from beam to beam, rad; negative for sensors that turn clockwise.
+    range_min, range_max : float
+        Limits of the sensor, m.
+    stamp : float
+        Time of the scan, s.
+    T_base_laser : SE2
+        Pose of the sensor on the robot.
+    mounting : Mounting
+        ``UPSIDE_DOWN`` mirrors the bearings.
+
+    Raises
+    ------
+    ScanError
+        If these numbers cannot describe a scan. Legal scans that say nothing are accepted.
+    """
+
+    ranges: NDArray[np.float32]
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    stamp: float = 0.0
+    T_base_laser: SE2 = field(default_factory=SE2.identity)
+    mounting: Mounting = Mounting.UPRIGHT
+
+    def __post_init__(self) -> None:
+        ranges = _as_ranges(self.ranges)
+        n = len(ranges)
+        _check(
+            math.isfinite(self.angle_min) and abs(self.angle_min) <= 2 * FULL_TURN,
+            "a finite angle_min within two turns",
+            f"angle_min {self.angle_min}",
+            "give bearings in radians",
+        )
+        _check(
+            math.isfinite(self.angle_increment) and (self.angle_increment != 0.0 or n == 1),
+            "a finite angle_increment other than 0",
+            f"angle_increment {self.angle_increment}",
+            "give the step between two beams in radians",
+        )
+        _check(
+            abs(self.angle_increment) * (n - 1) <= FULL_TURN * 1.01,
+            "beams that span at most one turn",
+            f"{n} beams of {self.angle_increment} rad each",
+            "check that angle_increment is in radians and fits the number of ranges",
+        )
+        _check(
+            math.isfinite(self.range_min) and self.range_min >= 0.0,
+            "a finite range_min of at least 0 m",
+            f"range_min {self.range_min}",
+            "take the limits from the sensor's data sheet",
+        )
+        _check(
+            self.range_max > self.range_min,
+            "a range_max above range_min",
+            f"range_max {self.range_max} with range_min {self.range_min}",
+            "take the limits from the sensor's data sheet",
+        )
+        _check(
+            math.isfinite(self.stamp),
+            "a finite stamp in seconds",
+            f"stamp {self.stamp}",
+            "use 0 where the time is not known",
+        )
+        object.__setattr__(self, "ranges", ranges)
+
+    def __len__(self) -> int:
+        return len(self.ranges)
+
+    @cached_property
+    def bearings(self) -> NDArray[np.float64]:
+        """Bearing of every beam seen from above in the upright sensor frame, shape (n,), rad."""
+        bearings = self.angle_min + self.angle_increment * np.arange(len(self.ranges))
+        return self.mounting.value * bearings
+
+    @cached_property
+    def hit(self) -> NDArray[np.bool_]:
+        """Beams that measured a surface, shape (n,)."""
+        r = self.ranges
+        with np.errstate(invalid="ignore"):
+            return (r >= self.range_min) & (r > 0.0) & (r < self.range_max)
+
+    @cached_property
+    def no_return(self) -> NDArray[np.bool_]:
+        """Beams that met nothing within range, shape (n,): evidence of open space."""
+        with np.errstate(invalid="ignore"):
+            return (self.ranges >= self.range_max) & (self.ranges > 0.0)
+
+    def points(self) -> NDArray[np.float64]:
+        """End points of the beams that hit, in the base frame, shape (n_hit, 2), m."""
+        r = self.ranges[self.hit].astype(np.float64)
+        a = self.bearings[self.hit]
+        return self.T_base_laser.apply(np.column_stack([r * np.cos(a), r * np.sin(a)]))
+
+
+def _as_ranges(ranges: ArrayLike) -> NDArray[np.float32]:
+    array = np.asarray(ranges)
+    _check(
+        array.ndim == 1 and 1 <= array.size <= MAX_BEAMS and array.dtype.kind in "fiu",
+        f"a list of 1 to {MAX_BEAMS} ranges",
+        f"{array.dtype} of shape {array.shape}",
+        "pass one scan at a time, as numbers",
+    )
+    with np.errstate(over="ignore"):  # what float32 cannot hold is infinitely far
+        array = array.astype(np.float32)
+    array.flags.writeable = False
+    return array
+
+
+def _check(holds: object, expected: str, received: str, remedy: str) -> None:
+    if not holds:
+        raise ScanError(expected=expected, received=received, remedy=remedy)

@@ -1,0 +1,93 @@
+"""Rigid motions of the plane."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from firstfix.core.angles import wrap
+from firstfix.core.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class SE2:
+    """A pose, or the transform it stands for: ``T_a_b`` takes coordinates of b into a.
+
+    Parameters
+    ----------
+    x, y : float
+        Position of the origin of b in a, m.
+    yaw : float
+        Direction of the x axis of b in a, rad, counter-clockwise; stored in (-π, π].
+    """
+
+    x: float
+    y: float
+    yaw: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.x) and math.isfinite(self.y) and math.isfinite(self.yaw)):
+            raise InputError(
+                expected="a pose of finite numbers x, y, yaw",
+                received=f"({self.x}, {self.y}, {self.yaw})",
+                remedy="look for NaN or infinity where the pose comes from",
+            )
+        object.__setattr__(self, "yaw", wrap(float(self.yaw)))
+
+    @classmethod
+    def identity(cls) -> SE2:
+        """Return the transform that changes nothing."""
+        return cls(0.0, 0.0, 0.0)
+
+    @classmethod
+    def from_array(cls, pose: ArrayLike) -> SE2:
+        """Read a pose from its three numbers x (m), y (m), yaw (rad)."""
+        x, y, yaw = np.asarray(pose, np.float64).tolist()
+        return cls(x, y, yaw)
+
+    def as_array(self) -> NDArray[np.float64]:
+        """Return x (m), y (m), yaw (rad) as an array of shape (3,)."""
+        return np.array([self.x, self.y, self.yaw])
+
+    def __matmul__(self, other: SE2) -> SE2:
+        """Chain transforms: ``T_a_c = T_a_b @ T_b_c``."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return SE2(
+            self.x + c * other.x - s * other.y,
+            self.y + s * other.x + c * other.y,
+            self.yaw + other.yaw,
+        )
+
+    def inverse(self) -> SE2:
+        """Return the transform of the opposite direction: ``T_b_a`` of ``T_a_b``."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return SE2(-c * self.x - s * self.y, s * self.x - c * self.y, -self.yaw)
+
+    def apply(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Take points of frame b into frame a.
+
+        Parameters
+        ----------
+        points : ndarray, shape (..., 2)
+            Coordinates in b, m.
+
+        Returns
+        -------
+        ndarray, shape (..., 2)
+            Coordinates in a, m.
+        """
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        rotation = np.array([[c, -s], [s, c]])
+        return points @ rotation.T + np.array([self.x, self.y])
+
+    def rotation_jacobian(self) -> NDArray[np.float64]:
+        """Return the matrix, shape (3, 3), that turns (dx, dy, dyaw) of frame b into frame a."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    def distance_to(self, other: SE2) -> float:
+        """Return the distance between the two origins, m."""
+        return math.hypot(self.x - other.x, self.y - other.y)

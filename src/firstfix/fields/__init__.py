@@ -1,0 +1,1 @@
+"""What the map knows, computed once per map."""

@@ -1,0 +1,1 @@
+"""The static stage: where in the whole map was this scan taken?"""

@@ -1,0 +1,1 @@
+"""A robot to try it on."""
