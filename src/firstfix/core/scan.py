@@ -108,8 +108,10 @@ class LaserScan:
     @cached_property
     def bearings(self) -> NDArray[np.float64]:
         """Bearing of every beam seen from above in the upright sensor frame, shape (n,), rad."""
-        bearings = self.angle_min + self.angle_increment * np.arange(len(self.ranges))
-        return self.mounting.value * bearings
+        bearings = self.angle_min + self.angle_increment * np.arange(
+            len(self.ranges), dtype=np.float64
+        )
+        return bearings if self.mounting is Mounting.UPRIGHT else -bearings
 
     @cached_property
     def hit(self) -> NDArray[np.bool_]:

@@ -81,7 +81,8 @@ class SE2:
         """
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         rotation = np.array([[c, -s], [s, c]])
-        return points @ rotation.T + np.array([self.x, self.y])
+        moved: NDArray[np.float64] = points @ rotation.T + np.array([self.x, self.y])
+        return moved
 
     def rotation_jacobian(self) -> NDArray[np.float64]:
         """Return the matrix, shape (3, 3), that turns (dx, dy, dyaw) of frame b into frame a."""

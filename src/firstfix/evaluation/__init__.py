@@ -1,1 +1,1 @@
-"""How good is it?"""
+"""Judging answers against the truth."""

@@ -1,1 +1,1 @@
-"""The static stage: where in the whole map was this scan taken?"""
+"""The static stage: one scan, the whole map, no motion."""
