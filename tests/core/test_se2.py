@@ -1,0 +1,91 @@
+"""SE(2) is a group, and points move with it."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from firstfix.core.angles import angle_error
+from firstfix.core.errors import InputError
+from firstfix.core.se2 import SE2
+
+metres = st.floats(-1e3, 1e3)
+poses = st.builds(SE2, metres, metres, st.floats(-10.0, 10.0))
+
+
+def assert_close(a: SE2, b: SE2) -> None:
+    assert a.distance_to(b) < 1e-8
+    assert angle_error(a.yaw, b.yaw) < 1e-9
+
+
+@given(poses)
+def test_identity_changes_nothing(T: SE2) -> None:
+    assert_close(T @ SE2.identity(), T)
+    assert_close(SE2.identity() @ T, T)
+
+
+@given(poses)
+def test_inverse_undoes_from_both_sides(T: SE2) -> None:
+    assert_close(T @ T.inverse(), SE2.identity())
+    assert_close(T.inverse() @ T, SE2.identity())
+    assert_close(T.inverse().inverse(), T)
+
+
+@given(poses, poses, poses)
+def test_products_are_associative(T_a_b: SE2, T_b_c: SE2, T_c_d: SE2) -> None:
+    assert_close((T_a_b @ T_b_c) @ T_c_d, T_a_b @ (T_b_c @ T_c_d))
+
+
+@given(poses, poses)
+def test_the_inverse_of_a_product_swaps_the_factors(T: SE2, U: SE2) -> None:
+    assert_close((T @ U).inverse(), U.inverse() @ T.inverse())
+
+
+@given(poses, poses, metres, metres)
+def test_apply_chains_like_the_product(T: SE2, U: SE2, x: float, y: float) -> None:
+    points = np.array([[x, y], [0.0, 0.0]])
+    np.testing.assert_allclose((T @ U).apply(points), T.apply(U.apply(points)), atol=1e-8)
+
+
+@given(poses)
+def test_apply_keeps_distances_and_takes_the_origin_to_the_pose(T: SE2) -> None:
+    points = np.array([[0.0, 0.0], [3.0, 4.0]])
+    moved = T.apply(points)
+    assert math.dist(*moved) == pytest.approx(5.0)
+    np.testing.assert_allclose(moved[0], [T.x, T.y])
+
+
+def test_a_quarter_turn_goes_counter_clockwise() -> None:
+    np.testing.assert_allclose(
+        SE2(1.0, 2.0, math.pi / 2).apply(np.array([1.0, 0.0])), [1.0, 3.0], atol=1e-12
+    )
+
+
+def test_yaw_is_stored_in_the_half_open_interval() -> None:
+    assert SE2(0.0, 0.0, -math.pi).yaw == math.pi
+    assert SE2(0.0, 0.0, 5 * math.pi / 2).yaw == pytest.approx(math.pi / 2)
+
+
+@given(poses)
+def test_three_numbers_there_and_back(T: SE2) -> None:
+    assert SE2.from_array(T.as_array()) == T
+
+
+@given(poses, st.floats(-1e-3, 1e-3), st.floats(-1e-3, 1e-3), st.floats(-1e-3, 1e-3))
+def test_rotation_jacobian_turns_small_steps(T: SE2, dx: float, dy: float, dyaw: float) -> None:
+    stepped = T @ SE2(dx, dy, dyaw)
+    step = np.array([stepped.x - T.x, stepped.y - T.y, angle_error(stepped.yaw, T.yaw)])
+    expected = T.rotation_jacobian() @ np.array([dx, dy, dyaw])
+    np.testing.assert_allclose(step[:2], expected[:2], atol=1e-9)
+    assert step[2] == pytest.approx(abs(expected[2]), abs=1e-9)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_pose_of_numbers_that_are_none_is_refused(bad: float, place: int) -> None:
+    numbers = [0.0, 0.0, 0.0]
+    numbers[place] = bad
+    with pytest.raises(InputError, match="finite"):
+        SE2(*numbers)
