@@ -26,6 +26,8 @@ class Recording:
         ``T_map_base`` at each scan: x (m), y (m), yaw (rad); NaN rows where it is not known.
     runs : ndarray of int, shape (n_scans,), or None
         Scans with one number belong to one uninterrupted drive.
+    notes : tuple of str
+        What the reader had to assume or leave out, in words, for a person.
 
     Raises
     ------
@@ -37,6 +39,7 @@ class Recording:
     odometry: Trajectory | None = None
     truth: NDArray[np.float64] | None = None
     runs: NDArray[np.int64] | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n = len(self.scans)
