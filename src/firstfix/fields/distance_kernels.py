@@ -1,0 +1,163 @@
+"""The sweeps of the distance transforms over rows and columns."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+SATURATED = 65535
+
+# More than any side of a map, and counting on from it for any side stays within int32.
+_FAR = 1 << 30
+
+# Cells of a row that are finished together: small enough to stop early, 8 AVX2 registers long.
+_CHUNK = 128
+
+# LLVM vectorises the sweeps over columns only if each loop is this plain: rows taken out as
+# one-dimensional views, one array written a loop, every sum cast back to its own width.
+# That is ten times the speed of the same sweeps written as one loop.
+
+
+@njit(cache=True, nogil=True)
+def manhattan(occupied: NDArray[np.bool_], distance: NDArray[np.uint16]) -> None:
+    """Write the pointscore: down, then up, right and left in each row."""
+    height, width = occupied.shape
+    top, one = np.uint16(SATURATED - 1), np.uint16(1)
+    near = np.full(width, np.uint16(SATURATED))
+    for r in range(height):
+        wall, row = occupied[r], distance[r]
+        for c in range(width):
+            step = np.uint16(min(near[c], top) + one)
+            near[c] = np.uint16(0) if wall[c] else step
+        row[:] = near
+    near[:] = SATURATED
+    for r in range(height - 1, -1, -1):
+        row = distance[r]
+        for c in range(width):
+            near[c] = min(row[c], np.uint16(min(near[c], top) + one))
+        beside = SATURATED  # a wide integer: its neighbour in the row keeps it below
+        for c in range(width):
+            beside = min(int(near[c]), beside + 1)
+            row[c] = beside
+        for c in range(width - 1, -1, -1):
+            beside = min(int(row[c]), beside + 1)
+            row[c] = beside
+
+
+@njit(cache=True, nogil=True)
+def euclidean(
+    occupied: NDArray[np.bool_], column: NDArray[np.int32], distance: NDArray[np.float32]
+) -> None:
+    """Write the distance; ``column`` may share its memory (rows are read first)."""
+    height, width = occupied.shape
+    one = np.int32(1)
+    near = np.full(width, np.int32(_FAR))
+    for r in range(height):
+        wall, row = occupied[r], column[r]
+        for c in range(width):
+            near[c] = np.int32(0) if wall[c] else np.int32(near[c] + one)
+        row[:] = near
+    near[:] = _FAR
+    sites, starts = np.empty(width, np.int64), np.empty(width, np.int64)
+    squares = np.empty(width, np.float64)
+    for r in range(height - 1, -1, -1):
+        row, out = column[r], distance[r]
+        for c in range(width):
+            near[c] = min(row[c], np.int32(near[c] + one))
+        count = _lower_envelope(near, sites, starts)
+        _squares_of_envelope(near, sites[:count], starts[:count], squares)
+        for c in range(width):
+            out[c] = np.sqrt(squares[c])
+
+
+@njit(cache=True, nogil=True)
+def _lower_envelope(
+    near: NDArray[np.int32], sites: NDArray[np.int64], starts: NDArray[np.int64]
+) -> int:
+    """Find which columns u are nearest to some column of the row, and from where on."""
+    width = near.size
+    last = -1
+    for u in range(width):
+        g = np.int64(near[u])
+        if g >= _FAR:
+            continue
+        while last >= 0:
+            v, t = sites[last], starts[last]
+            if (t - v) ** 2 + np.int64(near[v]) ** 2 <= (t - u) ** 2 + g * g:
+                break
+            last -= 1
+        begin = np.int64(0)
+        if last >= 0:
+            v = sites[last]
+            # Integers far below 2**53 (sides up to 10**7): the floor of the quotient is exact.
+            rise = np.float64(u * u - v * v + g * g - np.int64(near[v]) ** 2)
+            begin = np.int64(np.floor(rise / np.float64(2 * (u - v)))) + 1
+        if begin < width:
+            last += 1
+            sites[last], starts[last] = u, begin
+    return last + 1
+
+
+@njit(cache=True, nogil=True)
+def _squares_of_envelope(
+    near: NDArray[np.int32],
+    sites: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    squares: NDArray[np.float64],
+) -> None:
+    end = squares.size
+    for k in range(sites.size - 1, -1, -1):
+        v = sites[k]
+        across = np.float64(near[v]) ** 2
+        for c in range(starts[k], end):
+            squares[c] = np.float64(c - v) ** 2 + across
+        end = starts[k]
+    squares[:end] = np.inf  # no column knows a wall: there is none
+
+
+@njit(cache=True, nogil=True)
+def truncated(occupied: NDArray[np.bool_], limit: int, squares: NDArray[np.uint16]) -> None:
+    """Write the squared distance, at most ``limit`` squared."""
+    height, width = occupied.shape
+    top, one = np.uint16(limit), np.uint16(1)
+    near = np.full(width, top)
+    for r in range(height):
+        wall, row = occupied[r], squares[r]
+        for c in range(width):
+            step = min(top, np.uint16(near[c] + one))
+            near[c] = np.uint16(0) if wall[c] else step
+        row[:] = near
+    near[:] = top
+    # A margin of the limit on both sides spares the inner loop every question about edges.
+    padded = np.full(width + 2 * limit, np.uint16(limit * limit))
+    for r in range(height - 1, -1, -1):
+        row, inner = squares[r], padded[limit : limit + width]
+        for c in range(width):
+            near[c] = min(row[c], np.uint16(near[c] + one))
+        for c in range(width):
+            inner[c] = near[c] * near[c]
+        for begin in range(0, width, _CHUNK):
+            best = row[begin : begin + _CHUNK]
+            _look_outward(padded[begin : begin + best.size + 2 * limit], limit, best)
+
+
+@njit(cache=True, nogil=True)
+def _look_outward(window: NDArray[np.uint16], limit: int, best: NDArray[np.uint16]) -> None:
+    """Compare with columns ever farther away, until none can be nearer; window = best + margins."""
+    n = best.size
+    best[:] = window[limit : limit + n]
+    lowest = np.uint16(limit * limit)
+    for c in range(window.size):
+        lowest = min(lowest, window[c])
+    for k in range(1, limit):
+        away = np.uint16(k * k)
+        if k % 4 == 1:
+            highest = np.uint16(0)
+            for c in range(n):
+                highest = max(highest, best[c])
+            if highest <= away + lowest:
+                return
+        left, right = window[limit - k : limit - k + n], window[limit + k : limit + k + n]
+        for c in range(n):
+            best[c] = min(best[c], np.uint16(min(left[c], right[c]) + away))
