@@ -7,8 +7,8 @@ from pathlib import Path
 
 from firstfix.core.errors import MapError
 
-# A real one is a few hundred bytes; the scanner of PyYAML needs a second or two for this many.
-MAX_YAML_BYTES = 65_536
+# A real one is a few hundred bytes; the scanner of PyYAML needs up to a second for this many.
+MAX_YAML_BYTES = 32_768
 
 _SUFFIXES = (".yaml", ".yml")
 _IMAGE_SUFFIXES = (".pgm", ".png", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff", ".gif", ".ppm")

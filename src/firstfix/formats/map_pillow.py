@@ -96,7 +96,7 @@ def _colour_key(image: ImageFile) -> Any:
     key = image.info.get("transparency")
     if isinstance(key, int) and image.mode == "L":
         # Pillow stretches the pixels of 2- and 4-bit greys to 8 bits, but not this key.
-        key *= {"L;2": 85, "L;4": 17}.get(str(image.tile[0].args), 1)
+        key *= {"L;2": 85, "L;4": 17}.get(str(image.tile[0][3]), 1)
     return key
 
 
@@ -162,4 +162,6 @@ def _codes(pixels: NDArray[Any], mode: str) -> NDArray[Any]:
         return pixels[..., 0]
     if mode == "I":  # 16-bit grey in Pillow before 11
         return pixels.clip(0, 65_535).astype(np.uint16)
-    return pixels.view(np.uint8) if mode == "1" else pixels
+    if mode == "1":  # true is 255 here
+        return np.minimum(pixels.view(np.uint8), 1)
+    return pixels

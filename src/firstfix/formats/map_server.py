@@ -103,9 +103,9 @@ def save_map(grid: OccupancyGrid, yaml_path: str | os.PathLike[str]) -> Path:
         _replace(path, header)
     except OSError as error:
         raise unreadable(path, error) from error
-    except UnicodeError as error:
+    except ValueError as error:  # NUL, or what UTF-8 cannot hold
         raise MapError(
-            expected="a file name in UTF-8",
+            expected="a file name that can exist",
             received=show(str(path)),
             remedy="choose another name",
         ) from error

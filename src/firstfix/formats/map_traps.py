@@ -145,8 +145,10 @@ def _about_unknown_grey(facts: MapFacts) -> Iterator[str]:
     """Warn of the grey that map savers write for unknown, where it is read as anything else."""
     header, white = facts.header, facts.image.white
     saved = (2 * 255 * facts.image.levels + white) // (2 * white) == GREY_UNKNOWN
+    # Mode scale knows no unknown grey at all: there, only transparent pixels are unknown.
+    as_saved = "mode: trinary" if header.mode is MapMode.SCALE else "free_thresh: 0.196"
     for name, read_as, remedy in (
-        (f"free (free_thresh {header.free_thresh})", facts.cells == FREE, "set free_thresh: 0.196"),
+        (f"free (free_thresh {header.free_thresh})", facts.cells == FREE, f"set {as_saved}"),
         ("a wall", facts.cells >= OCCUPIED_FROM, "check negate and occupied_thresh"),
     ):
         share = facts.share(saved & read_as)
