@@ -1,0 +1,74 @@
+"""A map as a picture, in the map frame."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.grid import OccupancyGrid
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MAX_PIXELS = 2500  # a side; more than a page can show
+
+GREY_WALL, GREY_UNKNOWN, GREY_FREE = 40, 205, 255
+
+
+def draw_map(axes: Axes, grid: OccupancyGrid) -> None:
+    """Draw a map where it lies in the map frame, its yaw included; axes in m.
+
+    Parameters
+    ----------
+    axes : Axes
+        Of matplotlib.
+    grid : OccupancyGrid
+        The map.
+    """
+    from matplotlib.transforms import Affine2D
+
+    origin = grid.T_map_grid
+    pixels = greys(grid, MAX_PIXELS)
+    step = math.ceil(max(grid.cells.shape) / MAX_PIXELS)
+    height, width = (side * step * grid.resolution for side in pixels.shape)
+    image = axes.imshow(
+        pixels,
+        cmap="gray",
+        vmin=0,
+        vmax=255,
+        origin="lower",
+        extent=(0.0, width, 0.0, height),
+        interpolation="nearest",
+    )
+    image.set_transform(
+        Affine2D().rotate(origin.yaw).translate(origin.x, origin.y) + axes.transData
+    )
+    corners = origin.apply(np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]))
+    axes.set_xlim(corners[:, 0].min(), corners[:, 0].max())
+    axes.set_ylim(corners[:, 1].min(), corners[:, 1].max())
+    axes.set_aspect("equal")
+    axes.set_facecolor(str(GREY_UNKNOWN / 255))
+    axes.set_xlabel("x in m")
+    axes.set_ylabel("y in m")
+
+
+def greys(grid: OccupancyGrid, max_pixels: int) -> NDArray[np.uint8]:
+    """Return the map in grey, row 0 at the bottom, at most ``max_pixels`` a side.
+
+    Where cells share a pixel the darkest is shown, so that thin walls stay: a wall before what
+    nobody knows before what is free.
+    """
+    grey = np.full(grid.cells.shape, GREY_UNKNOWN, np.uint8)
+    grey[grid.free] = GREY_FREE
+    grey[grid.occupied] = GREY_WALL
+    step = math.ceil(max(grey.shape) / max_pixels)
+    if step == 1:
+        return grey
+    blocks = np.pad(grey, [(0, -grid.height % step), (0, -grid.width % step)], mode="edge")
+    darkest: NDArray[np.uint8] = blocks.reshape(
+        len(blocks) // step, step, blocks.shape[1] // step, step
+    ).min(axis=(1, 3))
+    return darkest

@@ -1,0 +1,102 @@
+"""What came of one scan, compared with the truth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from firstfix.core.angles import angle_error
+from firstfix.core.estimate import LocateResult, Verdict
+from firstfix.core.se2 import SE2
+
+
+@dataclass(frozen=True, slots=True)
+class PoseError:
+    """Distance of a pose from the truth.
+
+    Parameters
+    ----------
+    metres : float
+        Of position, m; inf where there is no pose.
+    radians : float
+        Of heading, rad, never negative; inf where there is no pose.
+    """
+
+    metres: float
+    radians: float
+
+    @classmethod
+    def between(cls, pose: SE2, truth: SE2) -> PoseError:
+        """Measure the error of a pose against the truth."""
+        return cls(pose.distance_to(truth), angle_error(pose.yaw, truth.yaw))
+
+    def is_within(self, tolerance: PoseError) -> bool:
+        """Tell whether both parts are below those of a tolerance."""
+        return self.metres < tolerance.metres and self.radians < tolerance.radians
+
+
+NO_POSE = PoseError(math.inf, math.inf)
+FOUND = PoseError(0.5, math.radians(10.0))
+FOUND_WELL = PoseError(0.2, math.radians(3.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of one scan.
+
+    Parameters
+    ----------
+    index : int
+        Index of the scan in its recording.
+    verdict : Verdict
+        What the method said.
+    error : PoseError
+        Of the best hypothesis.
+    rank : int or None
+        Rank of the first hypothesis within `FOUND` of the truth, from 1; None if there is none.
+    cpu_s, wall_s : float
+        Processor and wall time of ``locate``, s.
+    """
+
+    index: int
+    verdict: Verdict
+    error: PoseError
+    rank: int | None
+    cpu_s: float
+    wall_s: float
+
+    @property
+    def is_found(self) -> bool:
+        """True if the best hypothesis is within `FOUND` of the truth, whatever the verdict."""
+        return self.error.is_within(FOUND)
+
+
+def judge(result: LocateResult, truth: SE2, *, index: int, cpu_s: float, wall_s: float) -> Outcome:
+    """Compare an answer with the truth, whatever its verdict.
+
+    Parameters
+    ----------
+    result : LocateResult
+        The answer.
+    truth : SE2
+        ``T_map_base``.
+    index : int
+        Index of the scan.
+    cpu_s, wall_s : float
+        What the answer took, s.
+
+    Returns
+    -------
+    Outcome
+        The scan in figures.
+    """
+    errors = [PoseError.between(hypothesis.pose, truth) for hypothesis in result.hypotheses]
+    ranks = [rank for rank, error in enumerate(errors, 1) if error.is_within(FOUND)]
+    return Outcome(
+        index,
+        result.verdict,
+        errors[0] if errors else NO_POSE,
+        ranks[0] if ranks else None,
+        cpu_s,
+        wall_s,
+    )

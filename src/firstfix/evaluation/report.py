@@ -1,0 +1,143 @@
+"""A report of a benchmark: a table, error curves, time against area."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from firstfix.core.errors import InputError
+from firstfix.evaluation.figure import PALETTE, new_figure, save_figure
+from firstfix.evaluation.outcome import FOUND
+from firstfix.evaluation.runs import CaseRun
+from firstfix.evaluation.tables import bench_table, foreign_table
+from firstfix.global_localization.config import Method
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Errors are shown on a logarithmic axis between these, m.
+LEAST_M, MOST_M = 1e-3, 1e2
+LEGEND = (
+    "Success: the best hypothesis within 0.5 m and 10° of the truth, whatever the verdict. "
+    "Unique, right and wrong: verdict UNIQUE, of these right (share) and wrong (count). "
+    "Errors are those of the successes. Times are of `locate` alone, one scan."
+)
+LINES = ("-", "--", "-.", ":")
+
+
+def write_report(runs: Sequence[CaseRun], document: dict[str, Any], folder: Path) -> Path:
+    """Write ``report.md`` with its plots into a folder, which is made where it is missing.
+
+    Parameters
+    ----------
+    runs : sequence of CaseRun
+        Cases on their own maps.
+    document : dict
+        Their figures, from `bench_document`.
+    folder : Path
+        Where the report goes; its files are replaced.
+
+    Returns
+    -------
+    Path
+        ``report.md``, absolute.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written, or matplotlib is not installed.
+    """
+    save_error_curves(runs, folder / "error_curves.png")
+    save_times(runs, folder / "time_by_area.png")
+    page = folder / "report.md"
+    try:
+        page.write_text(_page(document), encoding="utf-8")
+    except OSError as error:
+        raise InputError(
+            expected="a folder where a report can be written",
+            received=f"{folder} ({error.strerror})",
+            remedy="choose another folder",
+        ) from None
+    return page.resolve()
+
+
+def save_error_curves(runs: Sequence[CaseRun], path: Path) -> Path:
+    """Plot for every case which share of its scans has at most which position error."""
+    methods = _methods(runs)
+    figure = new_figure(4.0 + 5.0 * len(methods), 6.0)
+    panels = figure.subplots(1, len(methods), squeeze=False, sharey=True)[0]
+    names = list(dict.fromkeys(run.case for run in runs))
+    for method, axes in zip(methods, panels, strict=True):
+        for run in runs:
+            if run.method is method:
+                _error_curve(axes, run, names.index(run.case))
+        axes.axvline(FOUND.metres, color="0.5", lw=1, zorder=0)
+        axes.set(xscale="log", xlim=(LEAST_M, MOST_M), ylim=(0.0, 1.02))
+        axes.set(title=method.value, xlabel="error of position at most, m")
+        axes.grid(which="both", alpha=0.25)
+    panels[0].set_ylabel("share of scans")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside right upper", fontsize="small")
+    return save_figure(figure, path)
+
+
+def save_times(runs: Sequence[CaseRun], path: Path) -> Path:
+    """Plot processor time of a scan, median and 95th percentile, against the free area."""
+    figure = new_figure(9.0, 6.0)
+    axes = figure.subplots()
+    for method, colour, marker in zip(_methods(runs), PALETTE, "osD^v*", strict=False):
+        own = [run for run in runs if run.method is method]
+        area = np.array([run.free_area_m2 for run in own])
+        times = [[outcome.cpu_s for outcome in run.outcomes] for run in own]
+        median, most = (np.array([np.percentile(t, p) for t in times]) for p in (50, 95))
+        axes.vlines(area, median, most, color=colour, alpha=0.5, lw=1.5)
+        axes.scatter(area, median, color=colour, marker=marker, label=method.value, zorder=3)
+        for run, y in zip(own, median, strict=True):
+            axes.annotate(
+                run.case,
+                (run.free_area_m2, y),
+                xytext=(4, -9),
+                textcoords="offset points",
+                fontsize=6,
+                color="0.35",
+            )
+    axes.set(xscale="log", yscale="log")
+    axes.set(xlabel="free area of the map, m²", ylabel="CPU time of a scan, s (line: up to p95)")
+    axes.grid(which="both", alpha=0.25)
+    axes.legend()
+    return save_figure(figure, path)
+
+
+def _error_curve(axes: Axes, run: CaseRun, number: int) -> None:
+    errors = np.sort([outcome.error.metres for outcome in run.outcomes])
+    share = np.arange(1, len(errors) + 1) / len(errors)
+    known = np.isfinite(errors)
+    x = np.concatenate([[LEAST_M], np.clip(errors[known], LEAST_M, MOST_M), [MOST_M]])
+    y = np.concatenate([[0.0], share[known], [known.mean()]])
+    colour = PALETTE[number % len(PALETTE)]
+    style = LINES[number // len(PALETTE) % len(LINES)]
+    axes.step(x, y, where="post", color=colour, ls=style, lw=1.3, label=run.case)
+
+
+def _methods(runs: Sequence[CaseRun]) -> list[Method]:
+    return list(dict.fromkeys(run.method for run in runs))
+
+
+def _page(document: dict[str, Any]) -> str:
+    parts = [
+        "# firstfix bench",
+        LEGEND,
+        bench_table(document),
+    ]
+    if document["foreign_cases"]:
+        parts += ["## Scans on the maps of other buildings", foreign_table(document)]
+    parts += [
+        "## Errors",
+        "![share of scans by position error](error_curves.png)",
+        "## Time",
+        "![CPU time by free area](time_by_area.png)",
+    ]
+    return "\n\n".join(part.strip() for part in parts) + "\n"

@@ -1,0 +1,162 @@
+"""One method on one case, with the time it takes."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from firstfix.core.angles import FULL_TURN
+from firstfix.core.estimate import Verdict
+from firstfix.core.grid import FREE, OCCUPIED, OccupancyGrid
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.evaluation.apart import peak_rss_mb
+from firstfix.evaluation.case import Case, evenly_spaced, known_truth
+from firstfix.evaluation.outcome import Outcome, judge
+from firstfix.fields.raycast import expected_ranges
+from firstfix.global_localization.config import Method
+from firstfix.global_localization.locate import Locator
+
+
+@dataclass(frozen=True, slots=True)
+class CaseRun:
+    """One case, tried with one method.
+
+    Parameters
+    ----------
+    case, site, kind : str
+        The case.
+    method : Method
+        The method.
+    outcomes : tuple of Outcome
+        One for each scan that was tried.
+    free_area_m2 : float
+        Free area of the map, m².
+    prepare_s : float
+        Processor time (user + system) that preparing the map took without a disk cache, kernels
+        compiled, s. Not wall time: that would depend on what else the machine does.
+    rss_mb : float or None
+        Peak resident memory of the process that did this and nothing else, MB.
+    """
+
+    case: str
+    site: str
+    kind: str
+    method: Method
+    outcomes: tuple[Outcome, ...]
+    free_area_m2: float
+    prepare_s: float
+    rss_mb: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class ForeignRun:
+    """Scans of one case, tried on the map of another building.
+
+    Parameters
+    ----------
+    case, on : str
+        Whose scans, and whose map.
+    method : Method
+        The method.
+    n, unique : int
+        Scans tried, and how many of them got the verdict UNIQUE: false accepts all.
+    """
+
+    case: str
+    on: str
+    method: Method
+    n: int
+    unique: int
+
+
+def run_case(case: Case, method: Method, limit: int = 0) -> CaseRun:
+    """Try a case with a method, in this process.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    method : Method
+        The method.
+    limit : int
+        Scans to try, evenly spaced over those whose truth is known; 0 for all.
+
+    Returns
+    -------
+    CaseRun
+        The outcomes, and what they took.
+
+    Raises
+    ------
+    InputError
+        If the case cannot be loaded or has no truth.
+    """
+    recording, grid = case.recording(), case.grid()
+    truth = known_truth(case, recording)
+    tried = evenly_spaced(np.flatnonzero(np.isfinite(truth).all(axis=1)), limit)
+    _compile_kernels(method)
+    start = time.process_time()
+    locator = Locator(grid, method=method, cache_dir=None)
+    prepare_s = time.process_time() - start
+    outcomes = tuple(
+        _try(locator, recording.scans[i], SE2.from_array(truth[i]), i) for i in tried.tolist()
+    )
+    return CaseRun(
+        case=case.name,
+        site=case.site,
+        kind=case.kind,
+        method=method,
+        outcomes=outcomes,
+        free_area_m2=grid.free_area,
+        prepare_s=prepare_s,
+        rss_mb=peak_rss_mb(),
+    )
+
+
+def run_foreign(case: Case, on: Case, method: Method, limit: int = 0) -> ForeignRun:
+    """Try scans of one case on the map of another, in this process.
+
+    Parameters
+    ----------
+    case : Case
+        Whose scans.
+    on : Case
+        Whose map.
+    method : Method
+        The method.
+    limit : int
+        Scans to try, evenly spaced; 0 for all.
+
+    Returns
+    -------
+    ForeignRun
+        How many scans were claimed to be found.
+    """
+    scans = case.recording().scans
+    locator = Locator(on.grid(), method=method, cache_dir=None)
+    tried = evenly_spaced(np.arange(len(scans)), limit)
+    verdicts = [locator.locate(scans[i]).verdict for i in tried.tolist()]
+    return ForeignRun(case.name, on.name, method, len(verdicts), verdicts.count(Verdict.UNIQUE))
+
+
+def _try(locator: Locator, scan: LaserScan, truth: SE2, index: int) -> Outcome:
+    wall, cpu = time.perf_counter(), time.process_time()
+    result = locator.locate(scan)
+    cpu_s, wall_s = time.process_time() - cpu, time.perf_counter() - wall
+    return judge(result, truth, index=index, cpu_s=cpu_s, wall_s=wall_s)
+
+
+def _compile_kernels(method: Method) -> None:
+    """Locate in a small room, so that no figure contains the compiler."""
+    cells = np.full((120, 160), FREE, np.int8)
+    cells[[0, -1], :] = cells[:, [0, -1]] = OCCUPIED
+    cells[30:50, 100:120] = OCCUPIED
+    grid = OccupancyGrid(cells, 0.05)
+    bearings = np.linspace(-FULL_TURN / 2, FULL_TURN / 2, 180, endpoint=False)
+    ranges = expected_ranges(grid, SE2(3.0, 2.5, 0.4), bearings, 5.0).astype(np.float32)
+    step = float(bearings[1] - bearings[0])
+    scan = LaserScan(ranges, float(bearings[0]), step, range_min=0.1, range_max=5.0)
+    Locator(grid, method=method, cache_dir=None).locate(scan)
