@@ -1,0 +1,194 @@
+"""ROS messages, whoever decoded them, to core types.
+
+Nothing here imports ROS: a message is anything with the fields of its definition, from rospy,
+rclpy or a bag.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from firstfix.core.errors import ScanError
+from firstfix.core.scan import LaserScan, Mounting
+from firstfix.core.se2 import SE2
+
+# A unit quaternion that lost more than this is not a rotation any more.
+MIN_NORM = 1e-3
+
+
+class StampedTransform(NamedTuple):
+    """``T_parent_child`` at one time, still in space.
+
+    Parameters
+    ----------
+    parent, child : str
+        Frames, without a leading slash.
+    stamp : float
+        Time, s.
+    translation : tuple of float
+        x, y, z, m.
+    rotation : tuple of float
+        Unit quaternion x, y, z, w; four NaN if the message had none.
+    """
+
+    parent: str
+    child: str
+    stamp: float
+    translation: tuple[float, float, float]
+    rotation: tuple[float, float, float, float]
+
+
+def to_seconds(stamp: Any) -> float:
+    """Read a time.
+
+    Parameters
+    ----------
+    stamp : message
+        ROS 2 (``sec``, ``nanosec``) or rospy (``secs``, ``nsecs``).
+
+    Returns
+    -------
+    float
+        s.
+    """
+    try:
+        return float(stamp.sec + 1e-9 * stamp.nanosec)
+    except AttributeError:
+        return float(stamp.secs + 1e-9 * stamp.nsecs)
+
+
+def to_frame(name: str) -> str:
+    """Return the name of a frame as tf2 writes it: old ROS 1 nodes put a slash before it."""
+    return name.removeprefix("/")
+
+
+def to_laser_scan(
+    message: Any,
+    *,
+    T_base_laser: SE2,
+    mounting: Mounting,
+    stamp: float | None = None,
+) -> LaserScan:
+    """Convert a ``sensor_msgs/LaserScan``.
+
+    Beams follow ``angle_increment`` from ``angle_min``, whatever its sign; ``angle_max`` is not
+    looked at, because drivers disagree whether it is that of the last beam.
+
+    Parameters
+    ----------
+    message : message
+        The scan.
+    T_base_laser : SE2
+        Pose of the sensor on the robot.
+    mounting : Mounting
+        Which way up it is.
+    stamp : float or None
+        Time to use instead of the one in the header, s.
+
+    Returns
+    -------
+    LaserScan
+        The scan, with a copy of the ranges.
+
+    Raises
+    ------
+    ScanError
+        If the message cannot describe a scan.
+    """
+    return LaserScan(
+        # rclpy has an array.array here, rospy a tuple, rosbags an ndarray.
+        ranges=np.asarray(message.ranges),
+        angle_min=float(message.angle_min),
+        angle_increment=float(message.angle_increment),
+        range_min=float(message.range_min),
+        range_max=float(message.range_max),
+        stamp=to_seconds(message.header.stamp) if stamp is None else stamp,
+        T_base_laser=T_base_laser,
+        mounting=mounting,
+    )
+
+
+def to_transform(message: Any) -> StampedTransform:
+    """Convert a ``geometry_msgs/TransformStamped``.
+
+    Parameters
+    ----------
+    message : message
+        One transform, such as an element of ``tf2_msgs/TFMessage.transforms``.
+
+    Returns
+    -------
+    StampedTransform
+        ``T_parent_child``, of ``frame_id`` and ``child_frame_id``.
+    """
+    return _stamped(message, message.transform.translation, message.transform.rotation)
+
+
+def to_odometry(message: Any) -> StampedTransform:
+    """Convert a ``nav_msgs/Odometry``.
+
+    Parameters
+    ----------
+    message : message
+        The odometry; its twist and covariances are not used.
+
+    Returns
+    -------
+    StampedTransform
+        ``T_odom_base``, of ``frame_id`` and ``child_frame_id``.
+    """
+    pose = message.pose.pose
+    return _stamped(message, pose.position, pose.orientation)
+
+
+def to_planar(transform: StampedTransform) -> SE2:
+    """Project a transform onto the floor: x, y and the direction of the x axis.
+
+    Parameters
+    ----------
+    transform : StampedTransform
+        Of a level robot.
+
+    Returns
+    -------
+    SE2
+        ``T_parent_child``.
+
+    Raises
+    ------
+    ScanError
+        If a number of the transform is not finite.
+    """
+    x, y, yaw = planar(transform)
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):
+        raise ScanError(
+            expected=f"a transform of finite numbers from {transform.parent} to {transform.child}",
+            received=f"{transform.translation} and {transform.rotation}",
+            remedy="look for the node that publishes it",
+        )
+    return SE2(x, y, yaw)
+
+
+def planar(transform: StampedTransform) -> tuple[float, float, float]:
+    """Return what `to_planar` does as x (m), y (m), yaw (rad), NaN where it is not known."""
+    x, y, z, w = transform.rotation
+    # atan2(R[1, 0], R[0, 0]): where the x axis points, also upside down.
+    yaw = math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    return transform.translation[0], transform.translation[1], yaw
+
+
+def _stamped(message: Any, translation: Any, rotation: Any) -> StampedTransform:
+    q = (float(rotation.x), float(rotation.y), float(rotation.z), float(rotation.w))
+    norm = math.hypot(*q)
+    # An unset quaternion is all zeros, which some nodes send for "not known"; others send NaN.
+    x, y, z, w = (v / norm for v in q) if norm > MIN_NORM else (math.nan,) * 4
+    return StampedTransform(
+        parent=to_frame(message.header.frame_id),
+        child=to_frame(message.child_frame_id),
+        stamp=to_seconds(message.header.stamp),
+        translation=(float(translation.x), float(translation.y), float(translation.z)),
+        rotation=(x, y, z, w),
+    )
