@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.errors import InputError, ScanError
-from firstfix.formats.carmen_lines import PARSERS, LogLines, ScanLine
+from firstfix.formats.carmen_lines import PARSERS, ScanLine
+from firstfix.formats.log_lines import LogLines
 
 
 class CarmenLog:
