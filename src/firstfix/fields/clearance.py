@@ -14,8 +14,8 @@ def chessboard_clearance(occupied: NDArray[np.bool_]) -> NDArray[np.uint8]:
     """Measure the 8-connected distance of every cell to the nearest wall.
 
     All cells less than n columns and less than n rows away from a cell with clearance n are not
-    occupied. For a ray along walls, which buildings are made of, this square reaches farther than
-    the disc of the Euclidean distance less the two half diagonals.
+    occupied. Along walls, which buildings are made of, this square reaches farther than the disc of
+    the Euclidean distance less two half diagonals: 8.3 steps a ray instead of 12.7 on willow.
 
     Parameters
     ----------
