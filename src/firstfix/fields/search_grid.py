@@ -1,0 +1,118 @@
+"""The positions that a search looks at: free blocks of cells, gathered into tiles.
+
+A block of ``stride`` x ``stride`` cells is one position. Positions are stored tile by tile
+(16 rows x 64 columns of blocks), so that what a search needs of a tile lies together in memory and
+its inner loops have a fixed length that compiles to vector instructions without a remainder.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from firstfix.core.grid import OccupancyGrid
+
+TILE_ROWS = 16
+TILE_COLUMNS = 64
+
+# Half a robot's width: a scan at the nearest position still resembles the true one.
+SPACING_M = 0.2
+
+# Above this a table of expected ranges passes 200 MB and the search a second: look coarser.
+MAX_POSITIONS = 800_000
+
+
+@dataclass(frozen=True, eq=False)
+class SearchGrid:
+    """Positions of a search, sorted by tile, then row, then column.
+
+    Parameters
+    ----------
+    stride : int
+        Side of a block, cells.
+    rows, columns : ndarray of int32, shape (n,)
+        Block coordinates.
+    tile_rows, tile_columns : ndarray of int32, shape (t,)
+        Block coordinates of each tile's first row and column.
+    tile_starts : ndarray of int64, shape (t + 1,)
+        Positions ``tile_starts[i]`` to ``tile_starts[i + 1]`` belong to tile i.
+    """
+
+    stride: int
+    rows: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    tile_rows: NDArray[np.int32]
+    tile_columns: NDArray[np.int32]
+    tile_starts: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def offset(self) -> float:
+        """Place of a position in its block, cells: the middle of the block's central cell."""
+        return self.stride // 2 + 0.5
+
+    def centres(self, index: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Cell coordinates (x, y), each of shape (n,), of positions given by their index."""
+        columns, rows = self.columns[index].astype(np.float64), self.rows[index].astype(np.float64)
+        return columns * self.stride + self.offset, rows * self.stride + self.offset
+
+
+def build_search_grid(grid: OccupancyGrid) -> SearchGrid:
+    """Choose the positions to search in a map.
+
+    A block counts where its central cell is free, or no wall and at least half of the block is
+    free. The spacing is 0.2 m and doubles until there are at most ``MAX_POSITIONS`` of them.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+
+    Returns
+    -------
+    SearchGrid
+        The positions; none if nothing is free.
+    """
+    # Even, so that the end-point field can have two cells to a block; 1 if cells are coarse.
+    stride = max(1, 2 * round(SPACING_M / 2 / grid.resolution))
+    blocks = _free_blocks(grid.free, grid.occupied, stride)
+    while np.count_nonzero(blocks) > MAX_POSITIONS:
+        stride *= 2
+        blocks = _free_blocks(grid.free, grid.occupied, stride)
+    rows, columns = (index.astype(np.int32) for index in np.nonzero(blocks))
+    tiles_across = -(-blocks.shape[1] // TILE_COLUMNS)
+    tile = (rows // TILE_ROWS).astype(np.int64) * tiles_across + columns // TILE_COLUMNS
+    order = np.argsort(tile, kind="stable")
+    tiles, starts = np.unique(tile[order], return_index=True)
+    return SearchGrid(
+        stride=stride,
+        rows=rows[order],
+        columns=columns[order],
+        tile_rows=(tiles // tiles_across * TILE_ROWS).astype(np.int32),
+        tile_columns=(tiles % tiles_across * TILE_COLUMNS).astype(np.int32),
+        tile_starts=np.append(starts, len(rows)).astype(np.int64),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _free_blocks(
+    free: NDArray[np.bool_], occupied: NDArray[np.bool_], stride: int
+) -> NDArray[np.bool_]:
+    height, width = free.shape
+    blocks = np.zeros((-(-height // stride), -(-width // stride)), np.bool_)
+    for row in range(blocks.shape[0]):
+        for column in range(blocks.shape[1]):
+            y, x = row * stride + stride // 2, column * stride + stride // 2
+            if y >= height or x >= width or occupied[y, x]:
+                continue
+            count = stride * stride if free[y, x] else 0
+            for y in range(row * stride, min(height, (row + 1) * stride)):
+                for x in range(column * stride, min(width, (column + 1) * stride)):
+                    count += free[y, x]
+            blocks[row, column] = 2 * count >= stride * stride
+    return blocks

@@ -1,0 +1,75 @@
+"""What every method's answer has in common."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.errors import MapError
+from firstfix.core.estimate import LocateResult, SearchReport, Verdict
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+
+# Fewer beams than this cannot tell places apart, whatever they say.
+FEWEST_HITS = 8
+
+
+def check_searchable(grid: OccupancyGrid) -> None:
+    """Raise MapError if a map has nothing to compare with, or nowhere to be."""
+    for kind, cells in (("occupied", grid.occupied), ("free", grid.free)):
+        if not cells.any():
+            raise MapError(
+                expected="a map with walls and free space",
+                received=f"a map of {grid.width} x {grid.height} cells, none of them {kind}",
+                remedy="check its thresholds, negate and image with `firstfix map check`",
+            )
+
+
+def nothing_to_match(scan: LaserScan, hits: int, elapsed_s: float) -> LocateResult:
+    """Answer a legal scan that says too little."""
+    return LocateResult(
+        verdict=Verdict.NO_MATCH,
+        reason=f"only {hits} of {len(scan)} beams measured a surface, at least {FEWEST_HITS} are "
+        "needed: blocked sensor, open space, or limits range_min and range_max that do not fit it",
+        hypotheses=(),
+        search=SearchReport(poses=0, searched=0.0, proven=False),
+        elapsed_s=elapsed_s,
+    )
+
+
+def to_map(
+    grid: OccupancyGrid,
+    scan: LaserScan,
+    pose: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+) -> tuple[SE2, NDArray[np.float64]]:
+    """Bring a sensor pose in cells to the robot's pose in the map.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+    scan : LaserScan
+        Knows where the sensor sits.
+    pose : ndarray, shape (3,)
+        x, y (cells), heading (rad) of the sensor in the grid.
+    covariance : ndarray, shape (3, 3)
+        Of these three.
+
+    Returns
+    -------
+    SE2
+        ``T_map_base``.
+    ndarray, shape (3, 3)
+        Covariance of x (m), y (m), yaw (rad) in the map frame.
+    """
+    T_grid_laser = SE2(pose[0] * grid.resolution, pose[1] * grid.resolution, float(pose[2]))
+    T_map_laser = grid.T_map_grid @ T_grid_laser
+    T_map_base = T_map_laser @ scan.T_base_laser.inverse()
+    scale = np.diag([grid.resolution, grid.resolution, 1.0])
+    # A heading error swings the base around the sensor.
+    lever = np.eye(3)
+    lever[:2, 2] = -(T_map_base.y - T_map_laser.y), T_map_base.x - T_map_laser.x
+    J = lever @ grid.T_map_grid.rotation_jacobian() @ scale
+    return T_map_base, J @ covariance @ J.T

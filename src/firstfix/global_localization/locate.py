@@ -1,0 +1,152 @@
+"""The conductor of the static stage: one scan in, one answer out."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.estimate import Hypothesis, LocateResult, SearchReport, Verdict
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.scan import LaserScan
+from firstfix.fields.map_fields import MapFields, build_fields
+from firstfix.global_localization import exhaustive
+from firstfix.global_localization.answer import (
+    FEWEST_HITS,
+    check_searchable,
+    nothing_to_match,
+    to_map,
+)
+from firstfix.global_localization.beams import usable_beams
+from firstfix.global_localization.config import LocateConfig, Method
+from firstfix.global_localization.places import distinct_places
+from firstfix.global_localization.refine import refine_on_field, refine_on_rays
+from firstfix.global_localization.search import search
+from firstfix.global_localization.verdict import judge, place_probabilities
+from firstfix.global_localization.verify import Verification, verify
+
+# A third of the beams sorts out most places; the rest is spent on those that stay.
+_FIRST_LOOK_BEAMS = 60
+_SECOND_LOOK_PLACES = 48
+
+
+class Locator:
+    """Finds scans in one map, anywhere, without a guess.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+    method : Method
+        How to search.
+    config : LocateConfig, optional
+        Settings of the default method.
+    cache_dir : Path, optional
+        Folder of prepared maps, such as `firstfix.fields.cache.cache_folder`; by default the map is
+        prepared anew.
+
+    Raises
+    ------
+    MapError
+        If the map has no wall, or no free space to be in.
+    """
+
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        *,
+        method: Method = Method.FAST,
+        config: LocateConfig | None = None,
+        cache_dir: Path | None = None,
+    ) -> None:
+        check_searchable(grid)
+        self.method = method
+        self.config = config or LocateConfig()
+        self.fields = build_fields(grid, cache_dir)
+        if method is not Method.FAST:
+            _ = self.fields.pointscore  # part of the preparation, not of the first scan
+
+    def locate(self, scan: LaserScan) -> LocateResult:
+        """Find where in the map a scan was taken.
+
+        Parameters
+        ----------
+        scan : LaserScan
+            The scan, with the sensor's pose on the robot.
+
+        Returns
+        -------
+        LocateResult
+            Verdict and ranked hypotheses for ``T_map_base``.
+        """
+        if self.method is Method.FAST:
+            return locate(scan, self.fields, self.config)
+        poses = exhaustive.FAST if self.method is Method.PAPER else exhaustive.BASIC
+        return exhaustive.locate(scan, self.fields, poses)
+
+
+def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateResult:
+    """Search, refine, verify, judge.
+
+    Parameters
+    ----------
+    scan : LaserScan
+        The scan, with the sensor's pose on the robot.
+    fields : MapFields
+        The prepared map.
+    config : LocateConfig
+        Settings.
+
+    Returns
+    -------
+    LocateResult
+        Verdict and ranked hypotheses for ``T_map_base``.
+    """
+    started = time.perf_counter()
+    resolution = fields.grid.resolution
+    beams = usable_beams(scan)
+    hits = int(np.count_nonzero(beams.hit))
+    if hits < FEWEST_HITS:
+        return nothing_to_match(scan, hits, time.perf_counter() - started)
+
+    candidates, report = search(beams, fields, config.shortlist, config.budget_s)
+    poses = refine_on_field(candidates.poses, beams, fields)
+    first_look = verify(poses, beams.thinned(_FIRST_LOOK_BEAMS), fields)
+    poses = poses[distinct_places(poses, first_look.scores, resolution, _SECOND_LOOK_PLACES)]
+    second_look = verify(poses, beams, fields)
+    poses = poses[distinct_places(poses, second_look.scores, resolution, config.hypotheses)]
+    poses, covariances = refine_on_rays(poses, beams, fields)
+    verification = verify(poses, beams, fields)
+    ranked = distinct_places(poses, verification.scores, resolution, config.hypotheses)
+    probabilities = place_probabilities(verification.scores[ranked])
+
+    hypotheses = tuple(
+        Hypothesis(
+            *to_map(fields.grid, scan, poses[i], covariances[i]),
+            score=float(verification.scores[i]),
+            probability=float(probability),
+            evidence=verification.evidence(i),
+        )
+        for i, probability in zip(ranked, probabilities, strict=True)
+    )
+    verdict, reason = _judge(verification, ranked, probabilities, report, config)
+    return LocateResult(verdict, reason, hypotheses, report, time.perf_counter() - started)
+
+
+def _judge(
+    verification: Verification,
+    ranked: NDArray[np.int64],
+    probabilities: NDArray[np.float64],
+    report: SearchReport,
+    config: LocateConfig,
+) -> tuple[Verdict, str]:
+    verdict, reason = judge(
+        probabilities, verification.evidence(int(ranked[0])), config.unique_probability
+    )
+    if report.proven:
+        return verdict, reason
+    # What was not searched may hold a better place: never sure of a place then.
+    unseen = f"; the time budget left {1.0 - report.searched:.0%} of the map unsearched"
+    return (Verdict.AMBIGUOUS if verdict is Verdict.UNIQUE else verdict), reason + unseen

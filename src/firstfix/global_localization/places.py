@@ -1,0 +1,70 @@
+"""Which poses are one place, and which are two."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from firstfix.core.angles import FULL_TURN
+
+# Nearer than this in position and heading, two poses are one place.
+SEPARATION_M = 0.5
+SEPARATION_RAD = math.radians(20.0)
+
+
+def distinct_places(
+    poses: NDArray[np.float64],
+    scores: NDArray[np.float64] | NDArray[np.int64],
+    resolution: float,
+    most: int,
+) -> NDArray[np.int64]:
+    """Choose the best pose of each place, best first.
+
+    Parameters
+    ----------
+    poses : ndarray, shape (n, 3)
+        x, y (cells), heading (rad).
+    scores : ndarray, shape (n,)
+        Lower is better; of equal ones the earlier.
+    resolution : float
+        Side of a cell, m.
+    most : int
+        Number of places to stop at.
+
+    Returns
+    -------
+    ndarray of int64, shape (m,)
+        Indices of the chosen poses.
+    """
+    order = np.argsort(scores, kind="stable")
+    return _suppress(poses, order, SEPARATION_M / resolution, SEPARATION_RAD, most)
+
+
+@njit(cache=True, nogil=True)
+def _suppress(
+    poses: NDArray[np.float64],
+    order: NDArray[np.int64],
+    near_cells: float,
+    near_rad: float,
+    most: int,
+) -> NDArray[np.int64]:
+    kept = np.empty(min(most, order.shape[0]), np.int64)
+    n = 0
+    for i in order:
+        if n == kept.shape[0]:
+            break
+        taken = False
+        for j in kept[:n]:
+            turn = abs(poses[i, 2] - poses[j, 2]) % FULL_TURN
+            if min(turn, FULL_TURN - turn) <= near_rad:
+                dx, dy = poses[i, 0] - poses[j, 0], poses[i, 1] - poses[j, 1]
+                if dx * dx + dy * dy <= near_cells * near_cells:
+                    taken = True
+                    break
+        if not taken:
+            kept[n] = i
+            n += 1
+    return kept[:n]

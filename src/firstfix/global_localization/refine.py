@@ -1,0 +1,270 @@
+"""From a pose of the search grid to the pose the scan really fits: Gauss-Newton, twice.
+
+First on the distance field, which pulls from far and costs next to nothing, for every place of the
+shortlist; then on cast rays, which know which side of a wall was seen, for the few that matter.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from firstfix.fields.map_fields import MapFields
+from firstfix.fields.raycast import cast_ray_leaping
+from firstfix.global_localization.beams import Beams
+
+FIELD_BEAMS = 60
+RAY_BEAMS = 180
+
+# The search grid leaves a pose up to 0.14 m and 1.4 degrees off: wide first, then as sharp as
+# maps are.
+_FIRST_SIGMA_M = 0.3
+_LAST_SIGMA_M = 0.07
+_FIELD_ROUNDS = 8
+
+_RAY_ROUNDS = 8
+_RAY_SIGMA_M = 0.1
+# Rays that differ by more met something else.
+_RAY_GATE_M = 0.3
+
+# A drawn or simulated wall is seen at the face of its cells, one that a mapping run has drawn lies
+# in their middle: 0.25 +- 0.25 cells behind the face, to be found with the pose.
+_WALL_DEPTH = 0.25
+_WALL_DEPTH_SIGMA = 0.25
+
+# Neighbouring beams err together (the same wall drawn askew); this many beams say as much as one.
+_BEAMS_PER_WITNESS = 4.0
+
+
+def refine_on_field(
+    poses: NDArray[np.float64], beams: Beams, fields: MapFields
+) -> NDArray[np.float64]:
+    """Move poses to where the end points of the beams lie on walls.
+
+    Gauss-Newton on the bilinear distance field with Geman-McClure weights, whose width shrinks
+    from round to round.
+
+    Parameters
+    ----------
+    poses : ndarray, shape (n, 3)
+        x, y (cells), heading (rad) of the sensor in the grid.
+    beams : Beams
+        The scan.
+    fields : MapFields
+        The prepared map.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        The refined poses.
+    """
+    hits = beams.hits().thinned(FIELD_BEAMS)
+    resolution = fields.grid.resolution
+    sigmas = np.geomspace(_FIRST_SIGMA_M, max(_LAST_SIGMA_M, resolution), _FIELD_ROUNDS)
+    refined = poses.copy()
+    _descend_field(
+        refined,
+        hits.ranges / resolution * np.cos(hits.bearings),
+        hits.ranges / resolution * np.sin(hits.bearings),
+        fields.squares,
+        fields.distances,
+        sigmas / resolution,
+    )
+    return refined
+
+
+def refine_on_rays(
+    poses: NDArray[np.float64], beams: Beams, fields: MapFields
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Move poses to where measured and cast ranges agree, below the size of a cell.
+
+    Point-to-line alignment (Censi 2008) against the wall that each ray meets; how deep in its cells
+    the walls lie is estimated along with the pose.
+
+    Parameters
+    ----------
+    poses : ndarray, shape (n, 3)
+        x, y (cells), heading (rad) of the sensor in the grid.
+    beams : Beams
+        The scan.
+    fields : MapFields
+        The prepared map.
+
+    Returns
+    -------
+    poses : ndarray, shape (n, 3)
+        The refined poses.
+    covariances : ndarray, shape (n, 3, 3)
+        Of x, y (cells), heading (rad) of the sensor in the grid.
+    """
+    hits = beams.hits().thinned(RAY_BEAMS)
+    resolution = fields.grid.resolution
+    refined = poses.copy()
+    information = np.zeros((len(poses), 4, 4))
+    _descend_rays(
+        refined,
+        information,
+        hits.bearings,
+        hits.ranges / resolution,
+        fields.clearance,
+        fields.squares,
+        fields.distances,
+        (_RAY_SIGMA_M / resolution, _RAY_GATE_M / resolution),
+    )
+    # The depth of the walls is not asked for: invert first, then leave it out.
+    covariances = np.linalg.inv(information)[:, :3, :3] * _BEAMS_PER_WITNESS
+    return refined, covariances.astype(np.float64, copy=False)
+
+
+@njit(cache=True, nogil=True)
+def _descend_field(
+    poses: NDArray[np.float64],
+    ends_x: NDArray[np.float64],
+    ends_y: NDArray[np.float64],
+    squares: NDArray[np.uint16],
+    distances: NDArray[np.float32],
+    sigmas: NDArray[np.float64],
+) -> None:
+    height, width = squares.shape
+    A = np.empty((3, 3))
+    g = np.empty(3)
+    for k in range(poses.shape[0]):
+        for sigma in sigmas:
+            # A little stiffness (half a cell, two degrees): corridors must not slide away.
+            A[:] = 0.0
+            A[0, 0] = A[1, 1] = 0.5
+            A[2, 2] = 200.0
+            g[:] = 0.0
+            cos, sin = math.cos(poses[k, 2]), math.sin(poses[k, 2])
+            for i in range(ends_x.shape[0]):
+                px, py = cos * ends_x[i] - sin * ends_y[i], sin * ends_x[i] + cos * ends_y[i]
+                fx, fy = poses[k, 0] + px - 0.5, poses[k, 1] + py - 0.5
+                cx, cy = math.floor(fx), math.floor(fy)
+                if cx < 0 or cy < 0 or cx + 1 >= width or cy + 1 >= height:
+                    continue
+                u, v = fx - cx, fy - cy
+                d00, d10 = distances[squares[cy, cx]], distances[squares[cy, cx + 1]]
+                d01, d11 = distances[squares[cy + 1, cx]], distances[squares[cy + 1, cx + 1]]
+                d = (d00 * (1 - u) + d10 * u) * (1 - v) + (d01 * (1 - u) + d11 * u) * v
+                if d > 3.0 * sigma:
+                    continue
+                w = 1.0 / (1.0 + (d / sigma) ** 2) ** 2
+                jx = (d10 - d00) * (1 - v) + (d11 - d01) * v
+                jy = (d01 - d00) * (1 - u) + (d11 - d10) * u
+                jt = px * jy - py * jx
+                A[0, 0] += w * jx * jx
+                A[0, 1] += w * jx * jy
+                A[0, 2] += w * jx * jt
+                A[1, 1] += w * jy * jy
+                A[1, 2] += w * jy * jt
+                A[2, 2] += w * jt * jt
+                g[0] += w * jx * d
+                g[1] += w * jy * d
+                g[2] += w * jt * d
+            _step(poses[k], A, g, 3.0 * sigma)
+
+
+@njit(cache=True, nogil=True)
+def _step(
+    pose: NDArray[np.float64], A: NDArray[np.float64], g: NDArray[np.float64], most_cells: float
+) -> None:
+    """Solve A d = -g (upper triangle of A given) and move the pose by at most so many cells."""
+    c00 = A[1, 1] * A[2, 2] - A[1, 2] * A[1, 2]
+    c01 = A[0, 2] * A[1, 2] - A[0, 1] * A[2, 2]
+    c02 = A[0, 1] * A[1, 2] - A[0, 2] * A[1, 1]
+    c11 = A[0, 0] * A[2, 2] - A[0, 2] * A[0, 2]
+    c12 = A[0, 1] * A[0, 2] - A[0, 0] * A[1, 2]
+    c22 = A[0, 0] * A[1, 1] - A[0, 1] * A[0, 1]
+    determinant = A[0, 0] * c00 + A[0, 1] * c01 + A[0, 2] * c02
+    dx = -(c00 * g[0] + c01 * g[1] + c02 * g[2]) / determinant
+    dy = -(c01 * g[0] + c11 * g[1] + c12 * g[2]) / determinant
+    turn = -(c02 * g[0] + c12 * g[1] + c22 * g[2]) / determinant
+    shrink = min(1.0, most_cells / max(abs(dx), abs(dy), 1e-12))
+    pose[0] += shrink * dx
+    pose[1] += shrink * dy
+    pose[2] += max(-0.05, min(0.05, turn))
+
+
+@njit(cache=True, nogil=True)
+def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
+    poses: NDArray[np.float64],
+    information: NDArray[np.float64],
+    bearings: NDArray[np.float64],
+    ranges: NDArray[np.float64],
+    clearance: NDArray[np.uint8],
+    squares: NDArray[np.uint16],
+    distances: NDArray[np.float32],
+    widths: tuple[float, float],
+) -> None:
+    sigma, gate = widths
+    J = np.empty(4)
+    A = np.empty((4, 4))
+    g = np.empty(4)
+    for k in range(poses.shape[0]):
+        depth = _WALL_DEPTH
+        for _ in range(_RAY_ROUNDS):
+            A[:] = 0.0
+            A[0, 0] = A[1, 1] = 1e-2
+            A[2, 2] = 1.0
+            g[:] = 0.0
+            weights, squared = 0.0, 0.0
+            A[3, 3] = 1.0 / _WALL_DEPTH_SIGMA**2
+            g[3] = (depth - _WALL_DEPTH) / _WALL_DEPTH_SIGMA**2
+            for i in range(bearings.shape[0]):
+                angle = poses[k, 2] + bearings[i]
+                dx, dy = math.cos(angle), math.sin(angle)
+                expected = cast_ray_leaping(
+                    clearance, poses[k, 0], poses[k, 1], dx, dy, ranges[i] + gate + 2.0
+                )
+                nx, ny = _normal(
+                    squares,
+                    distances,
+                    poses[k, 0] + (expected - 1.0) * dx,
+                    poses[k, 1] + (expected - 1.0) * dy,
+                )
+                slant = nx * dx + ny * dy
+                if slant < 0.1:
+                    continue
+                residual = (ranges[i] - expected) * slant - depth
+                if abs(residual) > gate:
+                    continue
+                # Sub-cell noise of half a cell's spread keeps a perfect drawing from looking exact.
+                w = math.exp(-0.5 * (residual / sigma) ** 2)
+                J[0], J[1] = nx, ny
+                J[2] = ranges[i] * (dx * ny - dy * nx)
+                J[3] = -1.0
+                for a in range(4):
+                    g[a] += w * J[a] * residual
+                    for b in range(4):
+                        A[a, b] += w * J[a] * J[b]
+                weights += w
+                squared += w * residual * residual
+            move = np.linalg.solve(A, -g)
+            poses[k, 0] += max(-2.0, min(2.0, move[0]))
+            poses[k, 1] += max(-2.0, min(2.0, move[1]))
+            poses[k, 2] += max(-0.03, min(0.03, move[2]))
+            depth += max(-0.5, min(0.5, move[3]))
+        variance = max(squared / max(weights, 1.0), 1.0 / 12.0 / 4.0)
+        for a in range(4):
+            for b in range(4):
+                information[k, a, b] = A[a, b] / variance
+
+
+@njit(cache=True, nogil=True)
+def _normal(
+    squares: NDArray[np.uint16], distances: NDArray[np.float32], x: float, y: float
+) -> tuple[float, float]:
+    """Direction towards the nearest wall: minus the gradient of the distance field; 0 if flat."""
+    height, width = squares.shape
+    column, row = math.floor(x), math.floor(y)
+    if column < 1 or row < 1 or column + 1 >= width or row + 1 >= height:
+        return 0.0, 0.0
+    gx = np.float64(distances[squares[row, column + 1]]) - distances[squares[row, column - 1]]
+    gy = np.float64(distances[squares[row + 1, column]]) - distances[squares[row - 1, column]]
+    length = math.hypot(gx, gy)
+    if length < 1e-3:
+        return 0.0, 0.0
+    return -gx / length, -gy / length

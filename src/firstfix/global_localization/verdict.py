@@ -1,0 +1,76 @@
+"""How likely each place is, and whether the best may be published."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.estimate import Evidence, Verdict
+
+# How noisy this scan is in this map (people, moved chairs, a careless drawing) is not known
+# beforehand. Left open, it makes the likelihood of a place a power of its mean cost (the marginal
+# over an unknown scale, as Student's t comes from Gauss): what counts is the ratio of two costs,
+# not their difference. The exponent is half the number of independent things that a scan sees; the
+# floor is the cost of noise alone. docs/decisions/0005 has the measurement behind all three.
+_EXPONENT = 12.0
+_FLOOR = 0.2
+
+# Mean cost at which the best place of a wrong map begins to be as good as the right one.
+_WRONG_MAP_COST = 1.1
+
+
+def place_probabilities(scores: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turn the costs of separate places into probabilities.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (n,)
+        Mean cost of a beam at each place, nats.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Probability of each place; what is missing to 1 is that of a place that is not listed.
+    """
+    costs = np.append(scores, _WRONG_MAP_COST) + _FLOOR
+    likelihoods: NDArray[np.float64] = (costs.min() / costs) ** _EXPONENT
+    likelihoods /= likelihoods.sum()
+    return likelihoods[:-1]
+
+
+def judge(
+    probabilities: NDArray[np.float64], best: Evidence, unique_probability: float
+) -> tuple[Verdict, str]:
+    """Decide what a person, or a robot, may do with a result.
+
+    Parameters
+    ----------
+    probabilities : ndarray, shape (n,)
+        Of the places, most likely first; at least one.
+    best : Evidence
+        Of the most likely place.
+    unique_probability : float
+        Least probability for UNIQUE.
+
+    Returns
+    -------
+    Verdict
+        UNIQUE, AMBIGUOUS, or NO_MATCH if no place is more likely than all of them.
+    str
+        The reason in words.
+    """
+    fit = f"{best.explained:.0%} of {best.beams} beams fit"
+    if probabilities[0] >= unique_probability:
+        return Verdict.UNIQUE, f"{fit} here and nowhere else nearly as well"
+    nowhere = 1.0 - float(probabilities.sum())
+    if nowhere > 0.5:
+        against = "see through its walls" if best.through_wall > best.short else "end elsewhere"
+        reason = (
+            f"even at the best place only {fit} and the others {against}: "
+            "wrong map, unmapped place or blocked sensor"
+        )
+        return Verdict.NO_MATCH, reason
+    rivals = int(np.count_nonzero(probabilities >= 0.1 * probabilities[0]))
+    if rivals == 1:
+        return Verdict.AMBIGUOUS, f"{fit} here, too few to be sure"
+    return Verdict.AMBIGUOUS, f"{rivals} places fit about as well; motion would tell them apart"
