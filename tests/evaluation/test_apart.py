@@ -43,6 +43,15 @@ def test_a_killed_process_is_an_error_not_a_wait() -> None:
         run_apart([partial(os._exit, 9)], 1, ignore)
 
 
+def test_an_interruption_leaves_nobody_behind() -> None:
+    def interrupt(index: int, result: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_apart([partial(math.sqrt, 4.0), partial(time.sleep, 60.0)], 2, interrupt)
+    assert multiprocessing.active_children() == []
+
+
 def test_nothing_to_do_is_done() -> None:
     assert run_apart([], 4, ignore) == []
 

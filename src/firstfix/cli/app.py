@@ -1,7 +1,82 @@
-"""The command line."""
+"""The command line: which commands there are, and what their ends mean.
+
+Exit status: 0 done; 1 no answer where a pose was asked for; 2 wrong input, told in one line on
+stderr; 130 interrupted.
+"""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from firstfix import __version__
+from firstfix.cli.bench import bench
+from firstfix.cli.demo import demo
+from firstfix.cli.doctor import doctor
+from firstfix.cli.locate import locate
+from firstfix.cli.map import map_app
+from firstfix.core.errors import FirstfixError
+
+WRONG_INPUT = 2
+
+app = typer.Typer(
+    name="firstfix",
+    help="Find a robot anywhere in its map from one 2D LIDAR scan, without motion.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command()(locate)
+app.command()(bench)
+app.add_typer(map_app, name="map")
+app.command()(demo)
+app.command()(doctor)
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"firstfix {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    _version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Say the version."),
+    ] = False,
+) -> None:
+    """Find a robot anywhere in its map from one 2D LIDAR scan, without motion."""
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run a command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str or None
+        What follows the name of the program; None takes it from the process.
+
+    Returns
+    -------
+    int
+        The exit status.
+    """
+    try:
+        app(args=None if arguments is None else list(arguments), prog_name="firstfix")
+    except FirstfixError as error:
+        # One line, whatever a file's content put into the sentence.
+        typer.echo(f"firstfix: {' '.join(str(error).split())}", err=True)
+        return WRONG_INPUT
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else int(end.code is not None)
+    return 0
+
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line of this process."""
+    sys.exit(run())

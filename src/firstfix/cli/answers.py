@@ -1,0 +1,148 @@
+"""Answers for people and for programs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from firstfix.core.estimate import Hypothesis, LocateResult
+from firstfix.core.recording import Recording
+from firstfix.core.se2 import SE2
+from firstfix.evaluation.outcome import PoseError
+from firstfix.evaluation.tables import markdown_table
+
+MOST_ROWS = 10
+
+
+def truth_at(recording: Recording, index: int) -> SE2 | None:
+    """Return ``T_map_base`` at a scan; None where the log does not know it."""
+    if recording.truth is None or not np.isfinite(recording.truth[index]).all():
+        return None
+    return SE2.from_array(recording.truth[index])
+
+
+def as_json(index: int, result: LocateResult, truth: SE2 | None) -> dict[str, Any]:
+    """Put an answer into the document that ``locate --json`` writes, one a line.
+
+    Parameters
+    ----------
+    index : int
+        Of the scan.
+    result : LocateResult
+        The answer.
+    truth : SE2 or None
+        ``T_map_base`` where the log knows it.
+
+    Returns
+    -------
+    dict
+        ``index``, ``verdict``, ``reason``, ``pose`` [x (m), y (m), yaw (rad)] and ``covariance``
+        of the best hypothesis whatever the verdict (null if there is none), ``hypotheses``,
+        ``search``, ``elapsed_s``, ``error`` {"m", "deg"} (null without truth). No NaN, no infinity.
+    """
+    best = result.best
+    error = None
+    if best is not None and truth is not None:
+        off = PoseError.between(best.pose, truth)
+        error = {"m": off.metres, "deg": math.degrees(off.radians)}
+    document = {
+        "index": index,
+        "verdict": result.verdict.value,
+        "reason": result.reason,
+        "pose": None if best is None else best.pose.as_array().tolist(),
+        "covariance": None if best is None else best.covariance.tolist(),
+        "hypotheses": [_hypothesis(hypothesis) for hypothesis in result.hypotheses],
+        "search": asdict(result.search),
+        "elapsed_s": result.elapsed_s,
+        "error": error,
+    }
+    return {key: _finite(value) for key, value in document.items()}
+
+
+def as_text(result: LocateResult, truth: SE2 | None) -> str:
+    """Put an answer into lines for a person; ``truth`` is ``T_map_base`` where it is known."""
+    lines = [f"{result.verdict.value}: {result.reason}"]
+    best, search = result.best, result.search
+    if best is not None:
+        sigma = np.sqrt(np.clip(np.diagonal(best.covariance), 0.0, None))
+        lines += [
+            f"pose         {pose_text(best.pose)}",
+            f"σ            {pose_text(SE2.from_array(sigma))}",
+            f"probability  {best.probability:.1%}",
+            f"evidence     {_evidence_text(best)}",
+        ]
+        if truth is not None:
+            lines.append(f"truth        {error_text(best.pose, truth)} away")
+    proof = "optimum proven" if search.proven else "optimum not proven"
+    lines += [
+        f"search       {search.poses:,} poses, {search.searched:.0%} decided, {proof}",
+        f"time         {result.elapsed_s:.3f} s",
+    ]
+    if len(result.hypotheses) > 1:
+        lines += ["", _hypothesis_table(result).rstrip()]
+    if len(result.hypotheses) > MOST_ROWS:
+        lines.append(
+            f"and {len(result.hypotheses) - MOST_ROWS} less likely ones (--json lists all)"
+        )
+    return "\n".join(lines)
+
+
+def pose_text(pose: SE2) -> str:
+    """Write a pose for a person."""
+    return f"x {pose.x:.3f} m, y {pose.y:.3f} m, yaw {math.degrees(pose.yaw):.2f}°"
+
+
+def error_text(pose: SE2, truth: SE2) -> str:
+    """Write for a person how far a pose is from the truth."""
+    error = PoseError.between(pose, truth)
+    return f"{error.metres:.3f} m, {math.degrees(error.radians):.2f}°"
+
+
+def _hypothesis(hypothesis: Hypothesis) -> dict[str, Any]:
+    return {
+        "pose": hypothesis.pose.as_array().tolist(),
+        "covariance": hypothesis.covariance.tolist(),
+        "score": hypothesis.score,
+        "probability": hypothesis.probability,
+        "evidence": asdict(hypothesis.evidence),
+    }
+
+
+def _evidence_text(hypothesis: Hypothesis) -> str:
+    e = hypothesis.evidence
+    return (
+        f"{e.explained:.0%} of {e.beams} beams explained, {e.short:.0%} short, "
+        f"{e.through_wall:.0%} through a wall, {e.unknown:.0%} in unknown space"
+    )
+
+
+def _hypothesis_table(result: LocateResult) -> str:
+    head = ["rank", "x m", "y m", "yaw °", "probability", "score", "explained", "through wall"]
+    return markdown_table(
+        head,
+        [
+            [
+                str(rank),
+                f"{h.pose.x:.3f}",
+                f"{h.pose.y:.3f}",
+                f"{math.degrees(h.pose.yaw):.2f}",
+                f"{h.probability:.1%}",
+                f"{h.score:.4f}",
+                f"{h.evidence.explained:.0%}",
+                f"{h.evidence.through_wall:.0%}",
+            ]
+            for rank, h in enumerate(result.hypotheses[:MOST_ROWS], 1)
+        ],
+    )
+
+
+def _finite(value: Any) -> Any:
+    """Replace what JSON cannot say, at any depth, by null."""
+    if isinstance(value, dict):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,106 @@
+"""``firstfix bench``: how good it is, how fast, on which cases."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from firstfix.cli.progress import progress
+from firstfix.core.errors import InputError
+from firstfix.global_localization.config import Method
+
+if TYPE_CHECKING:
+    from firstfix.evaluation.bench import CaseTask, ForeignTask
+    from firstfix.evaluation.runs import CaseRun, ForeignRun
+
+
+def bench(
+    cases: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="CASES...",
+            help="Folders with map.yaml, scans.npz and meta.json, or folders of such folders.",
+        ),
+    ],
+    method: Annotated[
+        list[Method] | None,
+        typer.Option(help="Which method; may be given several times. [default: fast]"),
+    ] = None,
+    json_file: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="Write all figures to a file."),
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write a report with plots to a folder.")
+    ] = None,
+    foreign: Annotated[
+        bool, typer.Option("--foreign", help="Also try each case's scans in the next building.")
+    ] = False,
+    jobs: Annotated[int, typer.Option(min=1, help="Cases that run at a time.")] = 1,
+    limit: Annotated[
+        int, typer.Option(min=0, help="Scans of a case, evenly spaced; 0 tries all.")
+    ] = 0,
+) -> None:
+    """Locate every scan of every case and compare with the truth.
+
+    Times are processor time of one scan, kernels compiled, map prepared; memory is the peak of a
+    process that does nothing else. The totals `total` and `foreign` of the JSON are those of the
+    first --method; `totals` has one for each.
+    """
+    from firstfix.cli.cases import find_cases
+    from firstfix.evaluation import bench as runner
+    from firstfix.evaluation.document import bench_document
+    from firstfix.evaluation.runs import CaseRun, ForeignRun
+    from firstfix.evaluation.tables import bench_table, foreign_table
+
+    methods = list(dict.fromkeys(method or [Method.FAST]))
+    found = find_cases(cases)
+    _check_targets(json_file, report)
+    tasks: list[CaseTask | ForeignTask] = [*runner.case_tasks(found, methods, limit)]
+    if foreign:
+        tasks += runner.foreign_tasks(found, methods, limit)
+    with progress(len(tasks), "bench") as done:
+        runs = runner.run_tasks(tasks, jobs, lambda run: done(_told(run)))
+    own = [run for run in runs if isinstance(run, CaseRun)]
+    others = [run for run in runs if isinstance(run, ForeignRun)]
+    document = bench_document(own, others, methods)
+    typer.echo(bench_table(document), nl=False)
+    if foreign:
+        typer.echo("\n" + foreign_table(document), nl=False)
+        if not others:
+            typer.echo("note: no two cases have different sites; nothing foreign tried", err=True)
+    if json_file is not None:
+        _write_json(document, json_file)
+    if report is not None:
+        from firstfix.evaluation.report import write_report
+
+        typer.echo(f"report: {write_report(own, document, report)}", err=True)
+
+
+def _told(run: CaseRun | ForeignRun) -> str:
+    return f"{run.case}, {run.method.value}"
+
+
+def _check_targets(json_file: Path | None, report: Path | None) -> None:
+    """Refuse before hours of work what could not be written after them."""
+    if json_file is not None:
+        _write_json({}, json_file)
+    if report is not None:
+        from firstfix.evaluation.figure import new_figure
+
+        new_figure(1.0, 1.0)
+
+
+def _write_json(document: dict[str, Any], path: Path) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(
+            expected="a place where the figures can be written",
+            received=f"{path} ({error.strerror})",
+            remedy="choose another --json file",
+        ) from None

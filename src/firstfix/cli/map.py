@@ -1,0 +1,69 @@
+"""``firstfix map``: what is in a map, and what about it may surprise."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+map_app = typer.Typer(help="Look at a map.", no_args_is_help=True)
+
+MapPath = Annotated[Path, typer.Argument(metavar="MAP", help="YAML of a map_server map.")]
+
+
+@map_app.command()
+def check(map_path: MapPath) -> None:
+    """Load a map as map_server would, print its sizes, and warn of traps."""
+    from firstfix.formats.map_check import check_map
+
+    found = check_map(map_path)
+    origin = found.T_map_grid
+    between = max(0.0, 1.0 - found.free - found.occupied - found.unknown)
+    rows = [
+        ("yaml", f"{found.yaml}"),
+        ("image", f"{found.image} ({found.pixels})"),
+        ("mode", found.mode.value),
+        (
+            "size",
+            f"{found.width} x {found.height} cells, {found.width_m:.2f} x {found.height_m:.2f} m",
+        ),
+        ("resolution", f"{found.resolution:g} m per cell"),
+        ("origin", f"x {origin.x:g} m, y {origin.y:g} m, yaw {math.degrees(origin.yaw):.2f}°"),
+        ("free", f"{found.free:.1%}, {found.free_area:.1f} m²"),
+        ("occupied", f"{found.occupied:.1%}"),
+        ("unknown", f"{found.unknown:.1%}"),
+    ]
+    if between > 0.0005:
+        rows.append(("between", f"{between:.1%}"))
+    for title, text in rows:
+        typer.echo(f"{title:<12}{text}")
+    for warning in found.warnings:
+        typer.echo(f"warning: {warning}")
+    if not found.warnings:
+        typer.echo("no traps found")
+
+
+@map_app.command()
+def show(
+    map_path: MapPath,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Where the picture goes. [default: firstfix-NAME.png here]"
+        ),
+    ] = None,
+) -> None:
+    """Draw a map as firstfix sees it: walls, free and unknown space, in the map frame."""
+    from firstfix.evaluation.figure import check_path
+    from firstfix.evaluation.picture import draw_grid
+    from firstfix.formats.map_server import load_map
+
+    target = plot or Path(f"firstfix-{map_path.resolve().stem}.png")
+    check_path(target)
+    grid = load_map(map_path)
+    size = f"{grid.width * grid.resolution:.2f} x {grid.height * grid.resolution:.2f} m"
+    title = f"{map_path.name}: {size}, {grid.free_area:.1f} m² free"
+    typer.echo(f"{size}, {grid.width} x {grid.height} cells, {grid.free_area:.1f} m² free")
+    typer.echo(f"picture: {draw_grid(grid, target, title)}")

@@ -1,0 +1,159 @@
+"""Wrong input: exit 2, one line on stderr, nothing on stdout, never a traceback."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+Files = tuple[Path, Path]
+
+
+def assert_one_line(ended, *words: str) -> None:
+    assert ended.status == 2, ended
+    assert ended.out == ""
+    assert ended.err.startswith("firstfix: expected ")
+    assert ended.err.count("\n") == 1
+    assert ", received " in ended.err
+    assert "; " in ended.err
+    for word in words:
+        assert word in ended.err
+
+
+def spoil_scan(unique: Files, folder: Path, **changes: object) -> Path:
+    with np.load(unique[1]) as log:
+        kept = dict(log) | changes
+    path = folder / "spoilt.npz"
+    np.savez(path, **{k: v for k, v in kept.items() if v is not None})
+    return path
+
+
+def test_a_map_that_is_not_there(cli, unique: Files) -> None:
+    assert_one_line(cli("locate", "nowhere.yaml", unique[1]), "nowhere.yaml")
+
+
+def test_a_log_that_is_not_there(cli, unique: Files) -> None:
+    assert_one_line(cli("locate", unique[0], "nowhere.npz"), "nowhere.npz")
+
+
+def test_a_map_that_is_none(cli, unique: Files, tmp_path: Path) -> None:
+    (tmp_path / "cat.yaml").write_text("image: cat.png\nresolution: purr\n\norigin: [0, 0, 0]\n")
+    assert_one_line(cli("locate", "cat.yaml", unique[1]))
+    assert_one_line(cli("map", "check", "cat.yaml"))
+    assert_one_line(cli("map", "show", "cat.yaml"))
+    assert_one_line(cli("demo", "--world", "cat.yaml"))
+
+
+def test_an_image_cut_short(cli, unique: Files, tmp_path: Path) -> None:
+    text = unique[0].read_text()
+    (tmp_path / "map.yaml").write_text(text)
+    for image in unique[0].parent.glob("*.pgm"):
+        (tmp_path / image.name).write_bytes(image.read_bytes()[:200])
+    assert_one_line(cli("locate", "map.yaml", unique[1]))
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 no archive", b"\x00" * 100])
+def test_a_log_that_is_none(cli, unique: Files, tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "log.npz").write_bytes(content)
+    assert_one_line(cli("locate", unique[0], "log.npz"))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"ranges": np.empty((0, 180), np.float32)},
+        {"ranges": np.array("far")},
+        {"angle_increment": 0.0},
+        {"angle_increment": np.nan},
+        {"range_max": -1.0},
+        {"ranges": None},
+    ],
+)
+def test_scans_that_are_none(cli, unique: Files, tmp_path: Path, changes: dict) -> None:
+    assert_one_line(cli("locate", unique[0], spoil_scan(unique, tmp_path, **changes)))
+
+
+@pytest.mark.parametrize("index", [3, 10**12])
+def test_an_index_past_the_end(cli, unique: Files, index: int) -> None:
+    ended = cli("locate", *unique, "--index", index)
+    assert_one_line(ended, f"index {index}", "3 scans, 0 to 2")
+
+
+def test_a_map_with_nothing_in_it(cli, unique: Files, tmp_path: Path) -> None:
+    text = "image: blank.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
+    text += "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    (tmp_path / "blank.yaml").write_text(text)
+    for grey in (205, 254):
+        (tmp_path / "blank.pgm").write_bytes(b"P5 40 40 255\n" + bytes([grey]) * 1600)
+        assert_one_line(cli("locate", "blank.yaml", unique[1]))
+
+
+def test_options_that_contradict_each_other(cli, unique: Files) -> None:
+    assert_one_line(cli("locate", *unique, "--all", "--index", 1), "--index")
+    assert_one_line(cli("locate", *unique, "--all", "--plot", "a.png"), "--plot")
+
+
+@pytest.mark.parametrize("name", ["place.jpeg", "place"])
+def test_a_picture_of_no_known_kind(cli, unique: Files, name: str) -> None:
+    assert_one_line(cli("locate", *unique, "--plot", name), name)
+    assert_one_line(cli("demo", "--plot", name), name)
+    assert_one_line(cli("map", "show", unique[0], "--plot", name), name)
+
+
+def test_a_picture_without_matplotlib(cli, unique: Files, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    assert_one_line(cli("locate", *unique, "--plot", "a.png"), "firstfix[plot]")
+    assert_one_line(cli("bench", unique[0].parent, "--report", "out"), "firstfix[plot]")
+
+
+def test_a_world_that_is_none(cli) -> None:
+    assert_one_line(cli("demo", "--world", "atlantis"), "office, rooms", "atlantis")
+
+
+def test_cases_that_are_none(cli, tmp_path: Path) -> None:
+    assert_one_line(cli("bench", "nowhere"), "nowhere (there is none)")
+    assert_one_line(cli("bench", tmp_path), "a case")
+
+
+@pytest.mark.parametrize("meta", ["{", "[1]", "\xff"])
+def test_a_case_with_broken_words(cli, unique: Files, tmp_path: Path, meta: str) -> None:
+    folder = tmp_path / "case"
+    folder.mkdir()
+    for file in unique[0].parent.iterdir():
+        (folder / file.name).write_bytes(file.read_bytes())
+    (folder / "meta.json").write_text(meta, encoding="latin-1")
+    assert_one_line(cli("bench", folder), "meta.json")
+
+
+def test_figures_that_cannot_be_written(cli, unique: Files, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    assert_one_line(cli("bench", unique[0].parent, "--json", "file/bench.json"), "file/bench.json")
+
+
+def test_a_case_without_truth(cli, unique: Files, tmp_path: Path) -> None:
+    folder = tmp_path / "case"
+    folder.mkdir()
+    for file in unique[0].parent.iterdir():
+        (folder / file.name).write_bytes(file.read_bytes())
+    (folder / "scans.npz").unlink()
+    spoil_scan(unique, folder, true_pose=None).rename(folder / "scans.npz")
+    assert_one_line(cli("bench", folder), "true poses")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["locate"],
+        ["locate", "a", "b", "--index", "-1"],
+        ["locate", "a", "b", "--method", "magic"],
+        ["bench"],
+        ["bench", "a", "--jobs", "0"],
+        ["fly"],
+        ["--colour"],
+    ],
+)
+def test_a_wrong_command_line_ends_with_2(cli, arguments: list[str]) -> None:
+    ended = cli(*arguments)
+    assert ended.status == 2
+    assert "Traceback" not in ended.err
+    assert ended.err

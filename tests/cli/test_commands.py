@@ -1,0 +1,112 @@
+"""The other commands."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from firstfix import __version__
+
+Files = tuple[Path, Path]
+
+
+def test_help_names_every_command(cli) -> None:
+    ended = cli("--help")
+    assert ended.status == 0
+    for command in ("locate", "bench", "map", "demo", "doctor"):
+        assert command in ended.out
+        assert cli(command, "--help").status == 0
+
+
+def test_version(cli) -> None:
+    assert cli("--version").out == f"firstfix {__version__}\n"
+
+
+def test_bench_compares_with_the_truth_and_writes_it_down(cli, cases: Path, tmp_path: Path) -> None:
+    arguments = ["--foreign", "--jobs", 2, "--json", "out/bench.json", "--report", "out/report"]
+    ended = cli("bench", cases, *arguments)
+    assert ended.status == 0, ended
+    document = json.loads((tmp_path / "out" / "bench.json").read_text())
+    assert [row["name"] for row in document["cases"]] == ["alike", "unique"]
+    assert [row["site"] for row in document["cases"]] == ["rooms", "hall"]
+    unique = document["cases"][1]
+    assert (unique["n"], unique["success"], unique["wrong_unique"]) == (3, 1.0, 0)
+    assert unique["cpu_s"] > 0.0
+    assert unique["rss_mb"] > 20.0
+    assert document["total"]["n"] == document["foreign"]["n"] == 4
+    assert (tmp_path / "out" / "report" / "report.md").read_text().startswith("# firstfix bench")
+    assert "| unique " in ended.out
+    assert "| scans of " in ended.out
+
+
+def test_bench_takes_single_cases_and_a_limit(cli, cases: Path, tmp_path: Path) -> None:
+    ended = cli("bench", cases / "unique", "--limit", 1, "--foreign", "--json", "b.json")
+    assert ended.status == 0
+    document = json.loads((tmp_path / "b.json").read_text())
+    assert document["total"]["n"] == 1
+    assert document["foreign"] == {"n": 0, "unique": 0}
+    assert "nothing foreign" in ended.err
+
+
+def test_a_case_without_words_is_named_after_its_folder(cases: Path, tmp_path: Path) -> None:
+    from firstfix.cli.cases import find_cases
+
+    folder = tmp_path / "nameless"
+    folder.mkdir()
+    for name in ("map.yaml", "scans.npz"):
+        (folder / name).write_bytes((cases / "unique" / name).read_bytes())
+    (case,) = find_cases([folder])
+    assert (case.name, case.site, case.kind) == ("nameless", "nameless", "unknown")
+
+
+def test_map_check_says_what_is_in_a_map(cli, unique: Files) -> None:
+    ended = cli("map", "check", unique[0])
+    assert ended.status == 0
+    for text in ("200 x 160 cells, 10.00 x 8.00 m", "0.05 m per cell", "no traps found"):
+        assert text in ended.out
+
+
+def test_map_check_warns_of_traps(cli, unique: Files, tmp_path: Path) -> None:
+    text = unique[0].read_text().replace("mode: trinary\n", "")
+    (tmp_path / "map.yaml").write_text(text)
+    for image in unique[0].parent.glob("*.pgm"):
+        (tmp_path / image.name).write_bytes(image.read_bytes())
+    ended = cli("map", "check", "map.yaml")
+    assert ended.status == 0
+    assert "warning: mode is missing" in ended.out
+
+
+def test_map_show_draws_here_and_never_over_the_map(cli, unique: Files, tmp_path: Path) -> None:
+    ended = cli("map", "show", unique[0])
+    assert ended.status == 0
+    assert (tmp_path / "firstfix-map.png").exists()
+    assert str(tmp_path / "firstfix-map.png") in ended.out
+
+
+@pytest.mark.parametrize(("world", "end"), [("office", "found"), ("rooms", "number")])
+def test_the_demo_tells_a_story_that_ends_well(cli, tmp_path: Path, world: str, end: str) -> None:
+    ended = cli("demo", "--world", world, "--headless", "--seed", 3)
+    assert ended.status == 0, ended
+    for word in (
+        "Building",
+        "Robot",
+        "Scan",
+        "Method     paper",
+        "Method     fast",
+        "from the truth",
+    ):
+        assert word in ended.out
+    assert end in ended.out.splitlines()[-1]
+    assert (tmp_path / "firstfix-demo.png").stat().st_size > 5000
+
+
+def test_the_demo_takes_a_map_of_ones_own(cli, unique: Files) -> None:
+    assert cli("demo", "--world", unique[0], "--plot", "own.svg").status == 0
+
+
+def test_the_doctor_says_what_is_there(cli) -> None:
+    ended = cli("doctor")
+    assert ended.status == 0
+    for word in ("firstfix", "python", "numpy", "numba", "matplotlib", "cache", "kernels", "ROS"):
+        assert f"\n{word}" in f"\n{ended.out}"
+    assert "ready after" in ended.out
