@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -73,7 +75,9 @@ def bench(
         if not others:
             typer.echo("note: no two cases have different sites; nothing foreign tried", err=True)
     if json_file is not None:
-        _write_json(document, json_file)
+        with _writing(json_file):
+            text = json.dumps(document, indent=2, allow_nan=False)
+            json_file.write_text(text + "\n", encoding="utf-8")
     if report is not None:
         from firstfix.evaluation.report import write_report
 
@@ -87,20 +91,24 @@ def _told(run: CaseRun | ForeignRun) -> str:
 def _check_targets(json_file: Path | None, report: Path | None) -> None:
     """Refuse before hours of work what could not be written after them."""
     if json_file is not None:
-        _write_json({}, json_file)
+        with _writing(json_file):
+            json_file.parent.mkdir(parents=True, exist_ok=True)
+            json_file.open("a").close()  # earlier figures stay until there are new ones
     if report is not None:
         from firstfix.evaluation.figure import new_figure
 
         new_figure(1.0, 1.0)
+        with _writing(report):
+            report.mkdir(parents=True, exist_ok=True)
 
 
-def _write_json(document: dict[str, Any], path: Path) -> None:
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        yield
     except OSError as error:
         raise InputError(
-            expected="a place where the figures can be written",
+            expected="a place where results can be written",
             received=f"{path} ({error.strerror})",
-            remedy="choose another --json file",
+            remedy="choose another place for --json or --report",
         ) from None

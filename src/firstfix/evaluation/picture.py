@@ -107,7 +107,7 @@ def _draw_scan(axes: Axes, grid: OccupancyGrid, scan: LaserScan, T_map_base: SE2
 def _draw_hypothesis(axes: Axes, rank: int, hypothesis: Hypothesis) -> None:
     """Draw a robot with its heading, a ghost the less likely it is."""
     pose = hypothesis.pose
-    colour, solid = (BLUE, 1.0) if rank == 1 else (PURPLE, 0.25 + 0.75 * hypothesis.probability)
+    colour, solid = (BLUE, 1.0) if rank == 1 else (PURPLE, 0.15 + 0.85 * hypothesis.probability)
     left, right = axes.get_xlim()
     # On the whole of a large map a robot to scale would be a dot.
     size = max(ROBOT_M, (right - left) / 60)

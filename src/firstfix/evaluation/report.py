@@ -87,6 +87,8 @@ def save_error_curves(runs: Sequence[CaseRun], path: Path) -> Path:
 def save_times(runs: Sequence[CaseRun], path: Path) -> Path:
     """Plot processor time of a scan, median and 95th percentile, against the free area."""
     figure = new_figure(9.0, 6.0)
+    from matplotlib.ticker import LogFormatter
+
     axes = figure.subplots()
     for method, colour, marker in zip(_methods(runs), PALETTE, "osD^v*", strict=False):
         own = [run for run in runs if run.method is method]
@@ -105,6 +107,10 @@ def save_times(runs: Sequence[CaseRun], path: Path) -> Path:
                 color="0.35",
             )
     axes.set(xscale="log", yscale="log")
+    axes.margins(0.12)
+    for axis in (axes.xaxis, axes.yaxis):  # plain numbers, between the decades too if few
+        axis.set_major_formatter(LogFormatter())
+        axis.set_minor_formatter(LogFormatter(labelOnlyBase=False, minor_thresholds=(2.0, 0.5)))
     axes.set(xlabel="free area of the map, m²", ylabel="CPU time of a scan, s (line: up to p95)")
     axes.grid(which="both", alpha=0.25)
     axes.legend()

@@ -59,7 +59,8 @@ def foreign_table(document: Row) -> str:
 
 def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Lay out a table in Markdown: words to the left, numbers to the right."""
-    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    # A rule of Markdown needs three characters.
+    widths = [max(3, *map(len, column)) for column in zip(head, *rows, strict=True)]
     numeric = [
         all(not row[i] or row[i].lstrip("-")[:1].isdigit() or row[i] == "–" for row in rows)
         for i in range(len(head))
