@@ -160,7 +160,7 @@ def _has_free_cell(free: NDArray[np.bool_], stride: int) -> NDArray[np.bool_]:
     height, width = free.shape
     padded = np.pad(free, ((0, -height % stride), (0, -width % stride)))
     blocks = padded.reshape(-(-height // stride), stride, -(-width // stride), stride)
-    return np.logical_or.reduce(blocks, axis=(1, 3))
+    return np.asarray(blocks.any(axis=(1, 3)))
 
 
 def _spans(rows: NDArray[np.int32], columns: NDArray[np.int32]) -> NDArray[np.int32]:

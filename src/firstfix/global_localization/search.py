@@ -28,8 +28,8 @@ from firstfix.fields.range_table import DIRECTIONS
 from firstfix.fields.search_grid import TILE_COLUMNS, TILE_ROWS
 from firstfix.global_localization.beams import Beams, by_direction
 
-ENDPOINT_BEAMS = 60
-RANGE_BEAMS = 64
+ENDPOINT_BEAMS = 48
+RANGE_BEAMS = 48
 
 # Sensing through a wall is nearly impossible; a beam cut short by a person is common; a beam that
 # did not return may have met glass or black paint. Counts of range_table.UNIT_M: 1 m, 0.4 m, 0.5 m.
