@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -59,7 +60,8 @@ def locate(
         from firstfix.global_localization.locate import Locator
 
         locator = Locator(grid, method=method, cache_dir=cache_folder())
-    with progress(len(chosen), "locating") as done:
+    # On a terminal the answers themselves show how far it is.
+    with progress(0 if sys.stdout.isatty() else len(chosen), "locating") as done:
         for i in chosen:
             truth = truth_at(recording, i)
             result = locator.locate(recording.scans[i])

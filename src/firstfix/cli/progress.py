@@ -26,7 +26,7 @@ def progress(total: int, title: str) -> Iterator[Callable[[str], None]]:
     Parameters
     ----------
     total : int
-        Number of steps.
+        Number of steps; with fewer than two nothing is shown.
     title : str
         What is going on.
 

@@ -93,8 +93,8 @@ def save_times(runs: Sequence[CaseRun], path: Path) -> Path:
     for method, colour, marker in zip(_methods(runs), PALETTE, "osD^v*", strict=False):
         own = [run for run in runs if run.method is method]
         area = np.array([run.free_area_m2 for run in own])
-        times = [[outcome.cpu_s for outcome in run.outcomes] for run in own]
-        median, most = (np.array([np.percentile(t, p) for t in times]) for p in (50, 95))
+        times_ms = [[1e3 * outcome.cpu_s for outcome in run.outcomes] for run in own]
+        median, most = (np.array([np.percentile(t, p) for t in times_ms]) for p in (50, 95))
         axes.vlines(area, median, most, color=colour, alpha=0.5, lw=1.5)
         axes.scatter(area, median, color=colour, marker=marker, label=method.value, zorder=3)
         for run, y in zip(own, median, strict=True):
@@ -111,7 +111,7 @@ def save_times(runs: Sequence[CaseRun], path: Path) -> Path:
     for axis in (axes.xaxis, axes.yaxis):  # plain numbers, between the decades too if few
         axis.set_major_formatter(LogFormatter())
         axis.set_minor_formatter(LogFormatter(labelOnlyBase=False, minor_thresholds=(2.0, 0.5)))
-    axes.set(xlabel="free area of the map, m²", ylabel="CPU time of a scan, s (line: up to p95)")
+    axes.set(xlabel="free area of the map, m²", ylabel="CPU time of a scan, ms (line: up to p95)")
     axes.grid(which="both", alpha=0.25)
     axes.legend()
     return save_figure(figure, path)
