@@ -1,0 +1,114 @@
+"""A prepared map is the same from the cache as from the work."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from firstfix.core.grid import OCCUPIED, UNKNOWN, OccupancyGrid
+from firstfix.core.se2 import SE2
+from firstfix.fields import map_fields
+from firstfix.fields.clearance import chessboard_clearance
+from firstfix.fields.distance import euclidean_distance, manhattan_distance
+from firstfix.fields.map_fields import NEAR_M, MapFields, build_fields
+
+
+@pytest.fixture(scope="module")
+def grid() -> OccupancyGrid:
+    cells = np.zeros((90, 140), np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = OCCUPIED
+    cells[20:30, 40:44] = OCCUPIED
+    cells[60:80, 90:110] = UNKNOWN
+    return OccupancyGrid(cells, 0.05)
+
+
+def arrays_of(fields: MapFields) -> dict[str, NDArray[np.generic]]:
+    found = {"distances": fields.distances, "pointscore": fields.pointscore}
+    for part in (fields, fields.positions, fields.endpoints):
+        for field in dataclasses.fields(part):
+            value = getattr(part, field.name)
+            if isinstance(value, np.ndarray):
+                found[f"{type(part).__name__}.{field.name}"] = value
+    return found
+
+
+def assert_equal(a: MapFields, b: MapFields) -> None:
+    left, right = arrays_of(a), arrays_of(b)
+    assert left.keys() == right.keys()
+    for name in left:
+        np.testing.assert_array_equal(left[name], right[name], err_msg=name)
+        assert left[name].dtype == right[name].dtype
+
+
+def test_with_a_cache_it_is_the_same_as_without(grid, tmp_path):
+    fresh = build_fields(grid, None)
+    assert_equal(fresh, build_fields(grid, tmp_path / "cache"))  # builds
+    assert_equal(fresh, build_fields(grid, tmp_path / "cache"))  # reads
+
+
+def test_the_second_time_no_ray_is_cast(grid, tmp_path, monkeypatch):
+    build_fields(grid, tmp_path)
+
+    def never(*_: object) -> None:
+        raise AssertionError("the cache was not read")
+
+    monkeypatch.setattr(map_fields, "build_range_table", never)
+    build_fields(grid, tmp_path)
+
+
+def test_another_map_has_its_own_cache(grid, tmp_path):
+    build_fields(grid, tmp_path)
+    cells = grid.cells.copy()
+    cells[50, 20] = OCCUPIED
+    for other in (OccupancyGrid(cells, 0.05), OccupancyGrid(grid.cells, 0.1)):
+        assert_equal(build_fields(other, None), build_fields(other, tmp_path))
+
+
+def test_where_the_map_lies_does_not_matter_to_the_cache(grid, tmp_path):
+    build_fields(grid, tmp_path)
+    files = list(tmp_path.iterdir())
+    assert len(files) == 1
+    build_fields(OccupancyGrid(grid.cells, grid.resolution, SE2(5.0, -3.0, 1.0)), tmp_path)
+    assert list(tmp_path.iterdir()) == files
+
+
+def test_a_damaged_cache_is_built_again(grid, tmp_path):
+    fresh = build_fields(grid, tmp_path)
+    (file,) = tmp_path.iterdir()
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    file.write_bytes(content)
+    assert_equal(fresh, build_fields(grid, tmp_path))
+
+
+@pytest.mark.parametrize("cached", [False, True])
+def test_shared_arrays_cannot_be_written(grid, tmp_path, cached):
+    for _ in range(2):  # with a cache: built, then read
+        fields = build_fields(grid, tmp_path if cached else None)
+        for array in (fields.squares, fields.clearance, fields.endpoints.values, fields.ranges):
+            with pytest.raises(ValueError, match="read-only"):
+                array[...] = 0
+
+
+def test_distances_are_those_of_the_map(grid):
+    fields = build_fields(grid, None)
+    near = np.float32(fields.near)
+    np.testing.assert_array_equal(
+        fields.distances[fields.squares], np.minimum(euclidean_distance(grid.occupied), near)
+    )
+    np.testing.assert_array_equal(fields.clearance, chessboard_clearance(grid.occupied))
+    np.testing.assert_array_equal(fields.pointscore, manhattan_distance(grid.occupied))
+    assert fields.near * grid.resolution >= NEAR_M
+    assert len(fields.ranges) == len(fields.positions)
+
+
+@pytest.mark.parametrize("resolution", [0.001, 0.01, 0.05, 0.25, 2.0])
+def test_any_size_of_cell_can_be_prepared(resolution):
+    cells = np.zeros((30, 40), np.int8)
+    cells[0] = OCCUPIED
+    fields = build_fields(OccupancyGrid(cells, resolution), None)
+    assert fields.squares.max() <= fields.near**2
+    assert len(fields.distances) == fields.near**2 + 1
