@@ -1,0 +1,54 @@
+"""Settings are checked where they are made."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import pytest
+
+from firstfix.core.errors import InputError
+from firstfix.global_localization.config import LocateConfig, Method
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("budget_s", -0.1),
+        ("budget_s", math.nan),
+        ("shortlist", 0),
+        ("hypotheses", 1),
+        ("unique_probability", -0.01),
+        ("unique_probability", 1.01),
+        ("unique_probability", math.nan),
+    ],
+)
+def test_a_setting_out_of_range_is_named(name, value):
+    with pytest.raises(InputError, match=name):
+        LocateConfig(**{name: value})
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {},
+        {"budget_s": 0.0},
+        {"budget_s": math.inf},
+        {"shortlist": 1, "hypotheses": 2},
+        {"unique_probability": 0.0},
+        {"unique_probability": 1.0},
+    ],
+)
+def test_the_ends_of_every_range_are_allowed(settings):
+    config = LocateConfig(**settings)
+    for name, value in settings.items():
+        assert getattr(config, name) == value
+
+
+def test_settings_do_not_change():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        LocateConfig().budget_s = 1.0  # type: ignore[misc]
+
+
+def test_methods_have_the_names_of_the_command_line():
+    assert {method.value for method in Method} == {"fast", "paper", "paper-basic"}
