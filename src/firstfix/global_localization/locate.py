@@ -31,6 +31,10 @@ from firstfix.global_localization.verify import Verification, verify
 _FIRST_LOOK_BEAMS = 60
 _SECOND_LOOK_PLACES = 48
 
+# So many places are listed however unlikely, and all that are a hundredth as likely as the best.
+_LISTED_PLACES = 10
+_RIVAL_SHARE = 0.01
+
 
 class Locator:
     """Finds scans in one map, anywhere, without a guess.
@@ -116,7 +120,8 @@ def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateRe
     first_look = verify(poses, beams.thinned(_FIRST_LOOK_BEAMS), fields)
     poses = poses[distinct_places(poses, first_look.scores, resolution, _SECOND_LOOK_PLACES)]
     second_look = verify(poses, beams, fields)
-    poses = poses[distinct_places(poses, second_look.scores, resolution, config.hypotheses)]
+    ranked = distinct_places(poses, second_look.scores, resolution, config.hypotheses)
+    poses = poses[ranked[: _worth_listing(second_look.scores[ranked])]]
     poses, covariances = refine_on_rays(poses, beams, fields)
     verification = verify(poses, beams, fields)
     ranked = distinct_places(poses, verification.scores, resolution, config.hypotheses)
@@ -133,6 +138,12 @@ def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateRe
     )
     verdict, reason = _judge(verification, ranked, probabilities, report, config)
     return LocateResult(verdict, reason, hypotheses, report, time.perf_counter() - started)
+
+
+def _worth_listing(scores: NDArray[np.float64]) -> int:
+    probabilities = place_probabilities(scores)
+    rivals = int(np.count_nonzero(probabilities >= _RIVAL_SHARE * probabilities[0]))
+    return max(_LISTED_PLACES, rivals)
 
 
 def _judge(

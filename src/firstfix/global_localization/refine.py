@@ -26,6 +26,8 @@ _LAST_SIGMA_M = 0.07
 _FIELD_ROUNDS = 8
 
 _RAY_ROUNDS = 8
+# A step below this many cells (and a hundredth of it in radians) is no step.
+_SETTLED = 0.005
 _RAY_SIGMA_M = 0.1
 # Rays that differ by more met something else.
 _RAY_GATE_M = 0.3
@@ -107,7 +109,8 @@ def refine_on_rays(
     _descend_rays(
         refined,
         information,
-        hits.bearings,
+        np.cos(hits.bearings),
+        np.sin(hits.bearings),
         hits.ranges / resolution,
         fields.clearance,
         fields.squares,
@@ -192,7 +195,8 @@ def _step(
 def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
     poses: NDArray[np.float64],
     information: NDArray[np.float64],
-    bearings: NDArray[np.float64],
+    cosines: NDArray[np.float64],
+    sines: NDArray[np.float64],
     ranges: NDArray[np.float64],
     clearance: NDArray[np.uint8],
     squares: NDArray[np.uint16],
@@ -213,9 +217,10 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
             weights, squared = 0.0, 0.0
             A[3, 3] = 1.0 / _WALL_DEPTH_SIGMA**2
             g[3] = (depth - _WALL_DEPTH) / _WALL_DEPTH_SIGMA**2
-            for i in range(bearings.shape[0]):
-                angle = poses[k, 2] + bearings[i]
-                dx, dy = math.cos(angle), math.sin(angle)
+            cos, sin = math.cos(poses[k, 2]), math.sin(poses[k, 2])
+            for i in range(ranges.shape[0]):
+                dx = cos * cosines[i] - sin * sines[i]
+                dy = sin * cosines[i] + cos * sines[i]
                 expected = cast_ray_leaping(
                     clearance, poses[k, 0], poses[k, 1], dx, dy, ranges[i] + gate + 2.0
                 )
@@ -247,6 +252,8 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
             poses[k, 1] += max(-2.0, min(2.0, move[1]))
             poses[k, 2] += max(-0.03, min(0.03, move[2]))
             depth += max(-0.5, min(0.5, move[3]))
+            if abs(move[0]) + abs(move[1]) < _SETTLED and abs(move[2]) < 0.01 * _SETTLED:
+                break
         variance = max(squared / max(weights, 1.0), 1.0 / 12.0 / 4.0)
         for a in range(4):
             for b in range(4):

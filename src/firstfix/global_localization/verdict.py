@@ -16,7 +16,7 @@ _EXPONENT = 12.0
 _FLOOR = 0.2
 
 # Mean cost at which the best place of a wrong map begins to be as good as the right one.
-_WRONG_MAP_COST = 1.1
+_WRONG_MAP_COST = 2.3
 
 
 def place_probabilities(scores: NDArray[np.float64]) -> NDArray[np.float64]:
