@@ -122,7 +122,10 @@ def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateRe
     second_look = verify(poses, beams, fields)
     ranked = distinct_places(poses, second_look.scores, resolution, config.hypotheses)
     poses = poses[ranked[: _worth_listing(second_look.scores[ranked])]]
-    poses, covariances = refine_on_rays(poses, beams, fields)
+    on_rays, covariances = refine_on_rays(poses, beams, fields)
+    # Rays are sharper, but in a map with smeared walls they can do harm: the better pose stays.
+    poses = np.concatenate([on_rays, poses])
+    covariances = np.concatenate([covariances, covariances])
     verification = verify(poses, beams, fields)
     ranked = distinct_places(poses, verification.scores, resolution, config.hypotheses)
     probabilities = place_probabilities(verification.scores[ranked])
