@@ -1,0 +1,145 @@
+"""Every beam is explained, short, through a wall or in unknown space."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from firstfix.core.grid import OCCUPIED, UNKNOWN, OccupancyGrid
+from firstfix.fields.map_fields import MapFields, build_fields
+from firstfix.global_localization.beams import Beams
+from firstfix.global_localization.verify import EXPLAINED, SHORT, THROUGH, verify
+from firstfix.global_localization.verify import UNKNOWN as IN_UNKNOWN
+
+RESOLUTION = 0.05
+
+# The sensor stands at (2, 3) m and looks east, at a wall 4 m away; nothing is known above 5 m.
+SENSOR = np.array([[2.0 / RESOLUTION, 3.0 / RESOLUTION, 0.0]])
+
+
+@pytest.fixture(scope="module")
+def yard() -> MapFields:
+    """10 x 8 m with one wall at x = 6 m, 20 cm thick and from y = 0 to 5 m."""
+    cells = np.zeros((160, 200), np.int8)
+    cells[:100, 120:124] = OCCUPIED
+    cells[100:] = UNKNOWN
+    return build_fields(OccupancyGrid(cells, RESOLUTION), None)
+
+
+def beam(bearing: float, range_m: float, *, hit: bool = True) -> Beams:
+    return Beams(np.array([bearing]), np.array([range_m]), np.array([hit]))
+
+
+NORTH, EAST, WEST = np.pi / 2, 0.0, np.pi
+
+ONE_BEAM = [
+    (EAST, 4.02, True, EXPLAINED),
+    (EAST, 3.9, True, EXPLAINED),
+    (EAST, 4.15, True, EXPLAINED),
+    (EAST, 2.5, True, SHORT),
+    (EAST, 1.0, True, SHORT),
+    (EAST, 5.5, True, THROUGH),
+    (EAST, 30.0, True, THROUGH),  # through it and out of the map
+    (NORTH, 4.0, True, IN_UNKNOWN),
+    (WEST, 15.0, True, IN_UNKNOWN),  # outside the map
+    (NORTH, 1.0, True, SHORT),  # something stands where the map is free
+    (WEST, 10.0, False, EXPLAINED),  # nothing there, and nothing returned
+    (EAST, 3.0, False, EXPLAINED),  # the reach ends before the wall
+    (EAST, 10.0, False, THROUGH),  # a wall is there, and nothing returned
+]
+
+
+@pytest.mark.parametrize(("bearing", "range_m", "hit", "kind"), ONE_BEAM)
+def test_one_beam(yard, bearing, range_m, hit, kind):
+    counts = verify(SENSOR, beam(bearing, range_m, hit=hit), yard).counts
+    assert counts.tolist() == [[int(k == kind) for k in range(4)]]
+
+
+@pytest.mark.parametrize("quarter", range(4))
+def test_the_heading_turns_the_beams(yard, quarter):
+    turn = quarter * np.pi / 2
+    turned = SENSOR + np.array([0.0, 0.0, turn])
+    there = verify(turned, beam(EAST - turn, 2.5), yard)
+    here = verify(SENSOR, beam(EAST, 2.5), yard)
+    np.testing.assert_allclose(there.scores, here.scores)
+    assert there.counts.tolist() == here.counts.tolist()
+
+
+def cost(fields: MapFields, bearing: float, range_m: float, *, hit: bool = True) -> float:
+    return float(verify(SENSOR, beam(bearing, range_m, hit=hit), fields).scores[0])
+
+
+def test_seeing_through_a_wall_costs_more_than_being_short_and_that_more_than_fitting(yard):
+    fits, short, through = (cost(yard, EAST, r) for r in (4.02, 2.5, 5.5))
+    assert fits < 0.2
+    assert fits + 1.0 < short < through - 1.0
+
+
+def test_a_missing_return_costs_only_where_a_wall_should_have_answered(yard):
+    assert cost(yard, WEST, 10.0, hit=False) == 0.0
+    assert 0.0 < cost(yard, EAST, 10.0, hit=False) < cost(yard, EAST, 10.0)
+
+
+def test_the_farther_off_the_dearer(yard):
+    short = [cost(yard, EAST, r) for r in (4.0, 3.9, 3.8, 3.7, 3.5, 3.0)]
+    through = [cost(yard, EAST, r) for r in (4.1, 4.25, 4.4, 4.6, 5.0, 7.0)]
+    assert short == sorted(short)
+    assert through == sorted(through)
+
+
+def random_case(seed: int, n: int, poses: int) -> tuple[np.ndarray, Beams]:
+    rng = np.random.default_rng(seed)
+    x, y = rng.uniform(-5, 205, poses), rng.uniform(-5, 165, poses)
+    beams = Beams(rng.uniform(-7, 7, n), rng.uniform(0.05, 12, n), rng.random(n) < 0.7)
+    return np.column_stack([x, y, rng.uniform(-7, 7, poses)]), beams
+
+
+@settings(deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 400), st.integers(0, 5))
+def test_shares_are_a_partition_of_the_beams(yard, seed, n, poses):
+    """Also where the sensor stands in a wall or outside the map."""
+    where, beams = random_case(seed, n, poses)
+    verification = verify(where, beams, yard)
+    assert verification.counts.shape == (poses, 4)
+    assert (verification.counts >= 0).all()
+    assert np.isfinite(verification.scores).all()
+    assert (verification.scores >= 0.0).all()
+    for i in range(poses):
+        evidence = verification.evidence(i)
+        assert evidence.beams == verification.counts[i].sum() <= n
+        shares = (evidence.explained, evidence.short, evidence.through_wall, evidence.unknown)
+        assert sum(shares) == pytest.approx(1.0)
+
+
+@settings(deadline=None)
+@given(st.integers(0, 2**32 - 1), st.permutations(range(5)))
+def test_each_pose_is_judged_alone(yard, seed, order):
+    poses, beams = random_case(seed, 60, 5)
+    together, shuffled = verify(poses, beams, yard), verify(poses[order], beams, yard)
+    assert shuffled.scores.tolist() == together.scores[order].tolist()
+    assert shuffled.counts.tolist() == together.counts[order].tolist()
+
+
+@settings(deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 60))
+def test_the_score_is_a_mean_over_the_beams(yard, seed, n):
+    """It lies between the best and the worst beam, and twice the same beams say the same."""
+    poses, beams = random_case(seed, n, 1)
+    score = verify(poses, beams, yard).scores[0]
+    alone = [
+        verify(poses, beam(bearing, range_m, hit=hit), yard).scores[0]
+        for bearing, range_m, hit in zip(beams.bearings, beams.ranges, beams.hit, strict=True)
+    ]
+    assert min(alone) - 1e-9 <= score <= max(alone) + 1e-9
+    twice = Beams(*(np.repeat(array, 2) for array in (beams.bearings, beams.ranges, beams.hit)))
+    assert verify(poses, twice, yard).scores[0] == pytest.approx(score)
+
+
+def test_poses_and_beams_are_not_changed(yard):
+    poses, beams = random_case(1, 50, 4)
+    before = [poses.copy(), beams.bearings.copy(), beams.ranges.copy(), beams.hit.copy()]
+    verify(poses, beams, yard)
+    for now, then in zip((poses, beams.bearings, beams.ranges, beams.hit), before, strict=True):
+        np.testing.assert_array_equal(now, then)
