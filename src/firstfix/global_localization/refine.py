@@ -159,36 +159,40 @@ def _descend_field(
                 jy = (d01 - d00) * (1 - u) + (d11 - d10) * u
                 jt = px * jy - py * jx
                 A[0, 0] += w * jx * jx
-                A[0, 1] += w * jx * jy
-                A[0, 2] += w * jx * jt
+                A[1, 0] += w * jx * jy
+                A[2, 0] += w * jx * jt
                 A[1, 1] += w * jy * jy
-                A[1, 2] += w * jy * jt
+                A[2, 1] += w * jy * jt
                 A[2, 2] += w * jt * jt
                 g[0] += w * jx * d
                 g[1] += w * jy * d
                 g[2] += w * jt * d
-            _step(poses[k], A, g, 3.0 * sigma)
+            _solve(A, g)
+            shrink = min(1.0, 3.0 * sigma / max(abs(g[0]), abs(g[1]), 1e-12))
+            poses[k, 0] -= shrink * g[0]
+            poses[k, 1] -= shrink * g[1]
+            poses[k, 2] -= max(-0.05, min(0.05, g[2]))
 
 
 @njit(cache=True, nogil=True)
-def _step(
-    pose: NDArray[np.float64], A: NDArray[np.float64], g: NDArray[np.float64], most_cells: float
-) -> None:
-    """Solve A d = -g (upper triangle of A given) and move the pose by at most so many cells."""
-    c00 = A[1, 1] * A[2, 2] - A[1, 2] * A[1, 2]
-    c01 = A[0, 2] * A[1, 2] - A[0, 1] * A[2, 2]
-    c02 = A[0, 1] * A[1, 2] - A[0, 2] * A[1, 1]
-    c11 = A[0, 0] * A[2, 2] - A[0, 2] * A[0, 2]
-    c12 = A[0, 1] * A[0, 2] - A[0, 0] * A[1, 2]
-    c22 = A[0, 0] * A[1, 1] - A[0, 1] * A[0, 1]
-    determinant = A[0, 0] * c00 + A[0, 1] * c01 + A[0, 2] * c02
-    dx = -(c00 * g[0] + c01 * g[1] + c02 * g[2]) / determinant
-    dy = -(c01 * g[0] + c11 * g[1] + c12 * g[2]) / determinant
-    turn = -(c02 * g[0] + c12 * g[1] + c22 * g[2]) / determinant
-    shrink = min(1.0, most_cells / max(abs(dx), abs(dy), 1e-12))
-    pose[0] += shrink * dx
-    pose[1] += shrink * dy
-    pose[2] += max(-0.05, min(0.05, turn))
+def _solve(A: NDArray[np.float64], b: NDArray[np.float64]) -> None:
+    """Solve A x = b by Cholesky, in place; b becomes x."""
+    # Numba lends NumPy's solver only where SciPy is installed, which it is not at run time.
+    n = b.shape[0]
+    for i in range(n):
+        for j in range(i + 1):
+            total = A[i, j]
+            for k in range(j):
+                total -= A[i, k] * A[j, k]
+            A[i, j] = math.sqrt(total) if i == j else total / A[j, j]
+    for i in range(n):
+        for k in range(i):
+            b[i] -= A[i, k] * b[k]
+        b[i] /= A[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            b[i] -= A[k, i] * b[k]
+        b[i] /= A[i, i]
 
 
 @njit(cache=True, nogil=True)
@@ -236,7 +240,6 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
                 residual = (ranges[i] - expected) * slant - depth
                 if abs(residual) > gate:
                     continue
-                # Sub-cell noise of half a cell's spread keeps a perfect drawing from looking exact.
                 w = math.exp(-0.5 * (residual / sigma) ** 2)
                 J[0], J[1] = nx, ny
                 J[2] = ranges[i] * (dx * ny - dy * nx)
@@ -247,17 +250,16 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
                         A[a, b] += w * J[a] * J[b]
                 weights += w
                 squared += w * residual * residual
-            move = np.linalg.solve(A, -g)
-            poses[k, 0] += max(-2.0, min(2.0, move[0]))
-            poses[k, 1] += max(-2.0, min(2.0, move[1]))
-            poses[k, 2] += max(-0.03, min(0.03, move[2]))
-            depth += max(-0.5, min(0.5, move[3]))
-            if abs(move[0]) + abs(move[1]) < _SETTLED and abs(move[2]) < 0.01 * _SETTLED:
+            information[k] = A
+            _solve(A, g)
+            poses[k, 0] -= max(-2.0, min(2.0, g[0]))
+            poses[k, 1] -= max(-2.0, min(2.0, g[1]))
+            poses[k, 2] -= max(-0.03, min(0.03, g[2]))
+            depth -= max(-0.5, min(0.5, g[3]))
+            if abs(g[0]) + abs(g[1]) < _SETTLED and abs(g[2]) < 0.01 * _SETTLED:
                 break
-        variance = max(squared / max(weights, 1.0), 1.0 / 12.0 / 4.0)
-        for a in range(4):
-            for b in range(4):
-                information[k, a, b] = A[a, b] / variance
+        # A quarter of the spread of a cell keeps a perfect drawing from looking exact.
+        information[k] /= max(squared / max(weights, 1.0), 1.0 / 48.0)
 
 
 @njit(cache=True, nogil=True)
