@@ -46,7 +46,8 @@ def _sweep(occupied: NDArray[np.bool_], clearance: NDArray[np.uint8]) -> None:
         for c in range(width):
             beside = 0 if wall[c] else min(int(nearest[c]), beside, MAX_CLEARANCE - 1) + 1
             row[c] = beside
-        before[1:-1] = row
+        for c in range(width):  # a slice would compile NumPy's broadcasting: seconds
+            before[c + 1] = row[c]
     before[:] = MAX_CLEARANCE
     for r in range(height - 1, -1, -1):
         row = clearance[r]
@@ -55,7 +56,8 @@ def _sweep(occupied: NDArray[np.bool_], clearance: NDArray[np.uint8]) -> None:
         for c in range(width - 1, -1, -1):
             beside = min(int(row[c]), min(int(nearest[c]), beside) + 1)
             row[c] = beside
-        before[1:-1] = row
+        for c in range(width):  # a slice would compile NumPy's broadcasting: seconds
+            before[c + 1] = row[c]
 
 
 @njit(cache=True, nogil=True)

@@ -30,7 +30,8 @@ def manhattan(occupied: NDArray[np.bool_], distance: NDArray[np.uint16]) -> None
         for c in range(width):
             step = np.uint16(min(near[c], top) + one)
             near[c] = np.uint16(0) if wall[c] else step
-        row[:] = near
+        for c in range(width):
+            row[c] = near[c]
     near[:] = SATURATED
     for r in range(height - 1, -1, -1):
         row = distance[r]
@@ -57,7 +58,8 @@ def euclidean(
         wall, row = occupied[r], column[r]
         for c in range(width):
             near[c] = np.int32(0) if wall[c] else np.int32(near[c] + one)
-        row[:] = near
+        for c in range(width):
+            row[c] = near[c]
     near[:] = _FAR
     sites, starts = np.empty(width, np.int64), np.empty(width, np.int64)
     squares = np.empty(width, np.float64)
@@ -127,7 +129,8 @@ def truncated(occupied: NDArray[np.bool_], limit: int, squares: NDArray[np.uint1
         for c in range(width):
             step = min(top, np.uint16(near[c] + one))
             near[c] = np.uint16(0) if wall[c] else step
-        row[:] = near
+        for c in range(width):
+            row[c] = near[c]
     near[:] = top
     # A margin of the limit on both sides spares the inner loop every question about edges.
     padded = np.full(width + 2 * limit, np.uint16(limit * limit))
@@ -146,7 +149,8 @@ def truncated(occupied: NDArray[np.bool_], limit: int, squares: NDArray[np.uint1
 def _look_outward(window: NDArray[np.uint16], limit: int, best: NDArray[np.uint16]) -> None:
     """Compare with columns ever farther away, until none can be nearer; window = best + margins."""
     n = best.size
-    best[:] = window[limit : limit + n]
+    for c in range(n):
+        best[c] = window[limit + c]
     lowest = np.uint16(limit * limit)
     for c in range(window.size):
         lowest = min(lowest, window[c])

@@ -250,7 +250,9 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
                         A[a, b] += w * J[a] * J[b]
                 weights += w
                 squared += w * residual * residual
-            information[k] = A
+            for a in range(4):
+                for b in range(4):
+                    information[k, a, b] = A[a, b]
             _solve(A, g)
             poses[k, 0] -= max(-2.0, min(2.0, g[0]))
             poses[k, 1] -= max(-2.0, min(2.0, g[1]))
@@ -259,7 +261,10 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
             if abs(g[0]) + abs(g[1]) < _SETTLED and abs(g[2]) < 0.01 * _SETTLED:
                 break
         # A quarter of the spread of a cell keeps a perfect drawing from looking exact.
-        information[k] /= max(squared / max(weights, 1.0), 1.0 / 48.0)
+        variance = max(squared / max(weights, 1.0), 1.0 / 48.0)
+        for a in range(4):
+            for b in range(4):
+                information[k, a, b] /= variance
 
 
 @njit(cache=True, nogil=True)
