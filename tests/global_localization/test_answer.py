@@ -72,6 +72,11 @@ def test_the_covariance_moves_as_small_errors_do(T_map_grid, T_base_laser, pose,
     np.testing.assert_allclose(moved, moved.T, atol=1e-9 * np.abs(moved).max())
 
 
+def test_a_pose_is_made_of_plain_numbers():
+    pose, _ = to_map(grid_at(SE2(1, 2, 3), 0.1), scan_from(SE2.identity()), np.ones(3), np.eye(3))
+    assert [type(number) for number in (pose.x, pose.y, pose.yaw)] == [float] * 3
+
+
 def test_a_drawn_case():
     """Cells of 0.1 m; the map lies turned by 90 degrees at (1, 2), the sensor sits 0.5 m ahead."""
     grid = grid_at(SE2(1.0, 2.0, math.pi / 2), 0.1)

@@ -64,7 +64,8 @@ def to_map(
     ndarray, shape (3, 3)
         Covariance of x (m), y (m), yaw (rad) in the map frame.
     """
-    T_grid_laser = SE2(pose[0] * grid.resolution, pose[1] * grid.resolution, float(pose[2]))
+    x, y, heading = pose.tolist()
+    T_grid_laser = SE2(x * grid.resolution, y * grid.resolution, heading)
     T_map_laser = grid.T_map_grid @ T_grid_laser
     T_map_base = T_map_laser @ scan.T_base_laser.inverse()
     scale = np.diag([grid.resolution, grid.resolution, 1.0])
