@@ -83,11 +83,12 @@ def build_fields(grid: OccupancyGrid, cache_dir: Path | None) -> MapFields:
     positions = build_search_grid(grid)
     squares = truncated_squares(grid.occupied, near)
     clearance = chessboard_clearance(grid.occupied)
+    # Read-only throughout: shared between threads, and one type for the kernels, cached or not.
+    clearance.flags.writeable = False
 
     ranges = _cached_range_table(clearance, grid, positions, cache_dir)
     endpoints = build_endpoint_field(squares, grid.resolution, positions.stride, REACH_M)
-    # Read-only throughout: shared between threads, and one type for the kernels, cached or not.
-    for array in (squares, clearance, endpoints.values, ranges):
+    for array in (squares, endpoints.values, ranges):
         array.flags.writeable = False
     return MapFields(
         grid=grid,

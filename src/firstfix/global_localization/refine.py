@@ -105,10 +105,11 @@ def refine_on_rays(
     hits = beams.hits().thinned(RAY_BEAMS)
     resolution = fields.grid.resolution
     refined = poses.copy()
-    information = np.zeros((len(poses), 4, 4))
+    information, variances = np.empty((len(poses), 4, 4)), np.empty(len(poses))
     _descend_rays(
         refined,
         information,
+        variances,
         np.cos(hits.bearings),
         np.sin(hits.bearings),
         hits.ranges / resolution,
@@ -118,8 +119,8 @@ def refine_on_rays(
         (_RAY_SIGMA_M / resolution, _RAY_GATE_M / resolution),
     )
     # The depth of the walls is not asked for: invert first, then leave it out.
-    covariances = np.linalg.inv(information)[:, :3, :3] * _BEAMS_PER_WITNESS
-    return refined, covariances.astype(np.float64, copy=False)
+    covariances = np.linalg.inv(information)[:, :3, :3] * variances[:, None, None]
+    return refined, covariances * _BEAMS_PER_WITNESS
 
 
 @njit(cache=True, nogil=True)
@@ -132,7 +133,7 @@ def _descend_field(
     sigmas: NDArray[np.float64],
 ) -> None:
     height, width = squares.shape
-    A = np.empty((3, 3))
+    A, L = np.empty((3, 3)), np.empty((3, 3))
     g = np.empty(3)
     for k in range(poses.shape[0]):
         for sigma in sigmas:
@@ -167,7 +168,7 @@ def _descend_field(
                 g[0] += w * jx * d
                 g[1] += w * jy * d
                 g[2] += w * jt * d
-            _solve(A, g)
+            _solve(A, L, g)
             shrink = min(1.0, 3.0 * sigma / max(abs(g[0]), abs(g[1]), 1e-12))
             poses[k, 0] -= shrink * g[0]
             poses[k, 1] -= shrink * g[1]
@@ -175,30 +176,31 @@ def _descend_field(
 
 
 @njit(cache=True, nogil=True)
-def _solve(A: NDArray[np.float64], b: NDArray[np.float64]) -> None:
-    """Solve A x = b by Cholesky, in place; b becomes x."""
+def _solve(A: NDArray[np.float64], L: NDArray[np.float64], b: NDArray[np.float64]) -> None:
+    """Solve A x = b by Cholesky's A = L L'; only the lower half of A counts, b becomes x."""
     # Numba lends NumPy's solver only where SciPy is installed, which it is not at run time.
     n = b.shape[0]
     for i in range(n):
         for j in range(i + 1):
             total = A[i, j]
             for k in range(j):
-                total -= A[i, k] * A[j, k]
-            A[i, j] = math.sqrt(total) if i == j else total / A[j, j]
+                total -= L[i, k] * L[j, k]
+            L[i, j] = math.sqrt(total) if i == j else total / L[j, j]
     for i in range(n):
         for k in range(i):
-            b[i] -= A[i, k] * b[k]
-        b[i] /= A[i, i]
+            b[i] -= L[i, k] * b[k]
+        b[i] /= L[i, i]
     for i in range(n - 1, -1, -1):
         for k in range(i + 1, n):
-            b[i] -= A[k, i] * b[k]
-        b[i] /= A[i, i]
+            b[i] -= L[k, i] * b[k]
+        b[i] /= L[i, i]
 
 
 @njit(cache=True, nogil=True)
 def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
     poses: NDArray[np.float64],
     information: NDArray[np.float64],
+    variances: NDArray[np.float64],
     cosines: NDArray[np.float64],
     sines: NDArray[np.float64],
     ranges: NDArray[np.float64],
@@ -209,9 +211,10 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
 ) -> None:
     sigma, gate = widths
     J = np.empty(4)
-    A = np.empty((4, 4))
+    L = np.empty((4, 4))
     g = np.empty(4)
     for k in range(poses.shape[0]):
+        A = information[k]
         depth = _WALL_DEPTH
         for _ in range(_RAY_ROUNDS):
             A[:] = 0.0
@@ -250,10 +253,7 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
                         A[a, b] += w * J[a] * J[b]
                 weights += w
                 squared += w * residual * residual
-            for a in range(4):
-                for b in range(4):
-                    information[k, a, b] = A[a, b]
-            _solve(A, g)
+            _solve(A, L, g)
             poses[k, 0] -= max(-2.0, min(2.0, g[0]))
             poses[k, 1] -= max(-2.0, min(2.0, g[1]))
             poses[k, 2] -= max(-0.03, min(0.03, g[2]))
@@ -261,10 +261,7 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
             if abs(g[0]) + abs(g[1]) < _SETTLED and abs(g[2]) < 0.01 * _SETTLED:
                 break
         # A quarter of the spread of a cell keeps a perfect drawing from looking exact.
-        variance = max(squared / max(weights, 1.0), 1.0 / 48.0)
-        for a in range(4):
-            for b in range(4):
-                information[k, a, b] /= variance
+        variances[k] = max(squared / max(weights, 1.0), 1.0 / 48.0)
 
 
 @njit(cache=True, nogil=True)
