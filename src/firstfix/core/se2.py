@@ -35,6 +35,8 @@ class SE2:
                 received=f"({self.x}, {self.y}, {self.yaw})",
                 remedy="look for NaN or infinity where the pose comes from",
             )
+        object.__setattr__(self, "x", float(self.x))
+        object.__setattr__(self, "y", float(self.y))
         object.__setattr__(self, "yaw", wrap(float(self.yaw)))
 
     @classmethod

@@ -16,8 +16,13 @@ from firstfix.fields.clearance import chessboard_clearance
 from firstfix.fields.distance import MAX_LIMIT, manhattan_distance, truncated_squares
 from firstfix.fields.endpoint_field import build_endpoint_field
 from firstfix.fields.phased_field import PhasedField
-from firstfix.fields.range_table import REACH_M, build_range_table
-from firstfix.fields.search_grid import SearchGrid, build_search_grid
+from firstfix.fields.range_table import DIRECTIONS, REACH_M, UNIT_M, build_range_table
+from firstfix.fields.search_grid import (
+    MAX_POSITIONS,
+    SPACING_M,
+    SearchGrid,
+    build_search_grid,
+)
 
 # Farther than any refinement reaches for a wall.
 NEAR_M = 1.0
@@ -113,5 +118,6 @@ def _cached_range_table(
 
     if cache_dir is None:
         return build()["ranges"]
-    key = cache.content_key("range table 1", grid.occupied, grid.free, repr(grid.resolution))
+    settings = repr((grid.resolution, SPACING_M, MAX_POSITIONS, DIRECTIONS, UNIT_M, REACH_M))
+    key = cache.content_key("range table 1", grid.occupied, grid.free, settings)
     return cache.load_or_build(key, build, cache_dir)["ranges"]

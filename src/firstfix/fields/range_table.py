@@ -36,7 +36,7 @@ def build_range_table(
     Parameters
     ----------
     clearance : ndarray of uint8, shape (height, width)
-        Of the map, from `raycast.chessboard_clearance`; unknown space is transparent.
+        Of the map, from `clearance.chessboard_clearance`; unknown space is transparent.
     resolution : float
         Side of a cell, m.
     positions : SearchGrid

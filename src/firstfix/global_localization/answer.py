@@ -11,9 +11,6 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 
-# Fewer beams than this cannot tell places apart, whatever they say.
-FEWEST_HITS = 8
-
 
 def check_searchable(grid: OccupancyGrid) -> None:
     """Raise MapError if a map has nothing to compare with, or nowhere to be."""
@@ -26,12 +23,12 @@ def check_searchable(grid: OccupancyGrid) -> None:
             )
 
 
-def nothing_to_match(scan: LaserScan, hits: int, elapsed_s: float) -> LocateResult:
-    """Answer a legal scan that says too little."""
+def nothing_to_match(scan: LaserScan, hits: int, needed: int, elapsed_s: float) -> LocateResult:
+    """Answer a legal scan with fewer beams on surfaces than are needed."""
     return LocateResult(
         verdict=Verdict.NO_MATCH,
-        reason=f"only {hits} of {len(scan)} beams measured a surface, at least {FEWEST_HITS} are "
-        "needed: blocked sensor, open space, or limits range_min and range_max that do not fit it",
+        reason=f"only {hits} of {len(scan)} beams measured a surface, {needed} are needed: "
+        "blocked sensor, open space, or limits range_min and range_max that do not fit it",
         hypotheses=(),
         search=SearchReport(poses=0, searched=0.0, proven=False),
         elapsed_s=elapsed_s,

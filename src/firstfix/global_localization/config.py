@@ -23,7 +23,7 @@ class LocateConfig:
     Parameters
     ----------
     budget_s : float
-        Wall time after which the search stops and says what it has not seen, s, above 0.
+        Wall time after which the search stops and says what it has not seen, s, at least 0.
     shortlist : int
         Places of the search that are refined, at least 1.
     hypotheses : int

@@ -65,13 +65,13 @@ def locate(scan: LaserScan, fields: MapFields, poses: PoseGrid) -> LocateResult:
     Returns
     -------
     LocateResult
-        The paper publishes the lowest pose whatever the others are: always UNIQUE, with probability
-        1; the next lowest places are listed with probability 0.
+        The paper publishes the lowest pose whatever the others are: UNIQUE, with probability 1,
+        while the next lowest places are listed with probability 0; NO_MATCH if no beam hit.
     """
     started = time.perf_counter()
     hits = usable_beams(scan, longest_m=float("inf")).hits()
     if len(hits) == 0:
-        return nothing_to_match(scan, 0, time.perf_counter() - started)
+        return nothing_to_match(scan, 0, 1, time.perf_counter() - started)
     tried, scores = pose_scores(hits, fields, poses)
     ranked = distinct_places(tried, scores, fields.grid.resolution, _HYPOTHESES)
     verification = verify(tried[ranked], usable_beams(scan), fields)
