@@ -72,6 +72,18 @@ def test_beams_up_to_the_reach_stay_in_the_field(
         assert value == LIMIT
 
 
+@pytest.mark.parametrize("stride", [1, 2, 4, 6])
+@pytest.mark.parametrize("reach_m", [0.01, 1.0, 2.4, 3.0, 3.07])
+def test_the_margin_holds_the_longest_beam(stride, reach_m):
+    """Beyond it a beam would read another row, or another phase."""
+    field = build(np.ones((7, 9), np.bool_), 0.05, stride, reach_m)
+    for sign in (-1.0, 1.0):
+        end = stride // 2 + 0.5 + sign * reach_m / 0.05
+        assert -field.margin <= end // stride <= field.margin
+    assert field.rows >= 2 * field.margin + -(-7 // stride)
+    assert field.columns >= 2 * field.margin + -(-9 // stride)
+
+
 def test_a_wall_costs_nothing_and_what_is_far_from_it_the_limit():
     occupied = np.zeros((60, 60), np.bool_)
     occupied[:, 30] = True

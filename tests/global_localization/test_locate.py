@@ -380,7 +380,33 @@ def test_ranges_far_beyond_the_map_are_no_trouble(room):
     assert Locator(room.grid).locate(scan).verdict is not Verdict.UNIQUE
 
 
+@pytest.mark.xfail(
+    raises=(ValueError, OverflowError, MemoryError), reason="the margin grows with the longest beam"
+)
+def test_the_paper_takes_ranges_far_beyond_the_map_as_well(room):
+    ranges = np.full(90, 1.5, np.float32)
+    ranges[7] = 3e38
+    scan = LaserScan(ranges, -np.pi, FULL_TURN / 90, 0.1, math.inf)
+    assert Locator(room.grid, method=Method.PAPER).locate(scan).hypotheses
+
+
 # --- maps ---
+
+
+@pytest.mark.xfail(raises=IndexError, reason="a map without a position to search is not refused")
+@pytest.mark.parametrize("shape", [(1, 30), (2, 30), (30, 1), (9, 9)])
+def test_free_space_too_narrow_for_a_position(shape):
+    """An answer or a refusal, not a crash."""
+    cells = np.full(shape, OCCUPIED, np.int8)
+    cells[0] = FREE
+    cells[0, 0] = OCCUPIED
+    cells[-1, -1] = FREE
+    scan = LaserScan(np.full(90, 1.0, np.float32), -np.pi, FULL_TURN / 90, 0.1, 12.0)
+    try:
+        locator = Locator(OccupancyGrid(cells, 0.05))
+    except MapError:
+        return
+    assert locator.locate(scan).verdict is not Verdict.UNIQUE
 
 
 @pytest.mark.parametrize("resolution", [0.01, 0.02, 0.05, 0.1, 0.125, 0.25])
