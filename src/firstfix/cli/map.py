@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from firstfix.cli import alike
+
+if TYPE_CHECKING:
+    from firstfix.formats.map_check import MapCheck
 
 map_app = typer.Typer(help="Look at a map.", no_args_is_help=True)
 
@@ -14,11 +19,33 @@ MapPath = Annotated[Path, typer.Argument(metavar="MAP", help="YAML of a map_serv
 
 
 @map_app.command()
-def check(map_path: MapPath) -> None:
-    """Load a map as map_server would, print its sizes, and warn of traps."""
-    from firstfix.formats.map_check import check_map
+def check(
+    map_path: MapPath,
+    samples: alike.Samples = None,
+    beams: alike.Beams = 360,
+    fov: alike.Fov = 360.0,
+    reach: alike.Reach = 12.0,
+    seed: alike.Seed = 0,
+) -> None:
+    """Load a map as map_server would, print its sizes, warn of traps, and try what looks alike.
 
+    A simulated sensor takes one scan at random places, and each scan is located in the whole map.
+    """
+    from firstfix.formats.map_check import check_map
+    from firstfix.formats.map_server import load_map
+
+    lidar = alike.sensor(beams, fov, reach)
     found = check_map(map_path)
+    _tell_sizes(found)
+    for warning in found.warnings:
+        typer.echo(f"warning: {warning}")
+    if not found.warnings:
+        typer.echo("no traps found")
+    if samples != 0:
+        alike.tell(load_map(map_path), lidar, samples, seed)
+
+
+def _tell_sizes(found: MapCheck) -> None:
     origin = found.T_map_grid
     between = max(0.0, 1.0 - found.free - found.occupied - found.unknown)
     rows = [
@@ -39,10 +66,6 @@ def check(map_path: MapPath) -> None:
         rows.append(("between", f"{between:.1%}"))
     for title, text in rows:
         typer.echo(f"{title:<12}{text}")
-    for warning in found.warnings:
-        typer.echo(f"warning: {warning}")
-    if not found.warnings:
-        typer.echo("no traps found")
 
 
 @map_app.command()
@@ -54,16 +77,27 @@ def show(
             metavar="FILE", help="Where the picture goes. [default: firstfix-NAME.png here]"
         ),
     ] = None,
+    show_alike: Annotated[
+        bool, typer.Option("--alike", help="Mark which places look alike, as `map check` does.")
+    ] = False,
+    samples: alike.Samples = None,
+    beams: alike.Beams = 360,
+    fov: alike.Fov = 360.0,
+    reach: alike.Reach = 12.0,
+    seed: alike.Seed = 0,
 ) -> None:
     """Draw a map as firstfix sees it: walls, free and unknown space, in the map frame."""
-    from firstfix.evaluation.figure import check_path
+    from firstfix.evaluation.figure import check_path, new_figure
     from firstfix.evaluation.picture import draw_grid
     from firstfix.formats.map_server import load_map
 
     target = plot or Path(f"firstfix-{map_path.resolve().stem}.png")
     check_path(target)
+    new_figure(1.0, 1.0)  # says now, not after the work, that matplotlib is missing
+    lidar = alike.sensor(beams, fov, reach)
     grid = load_map(map_path)
     size = f"{grid.width * grid.resolution:.2f} x {grid.height * grid.resolution:.2f} m"
     title = f"{map_path.name}: {size}, {grid.free_area:.1f} m² free"
     typer.echo(f"{size}, {grid.width} x {grid.height} cells, {grid.free_area:.1f} m² free")
-    typer.echo(f"picture: {draw_grid(grid, target, title)}")
+    places = alike.look_around(grid, lidar, samples, seed) if show_alike else ()
+    typer.echo(f"picture: {draw_grid(grid, target, title, places)}")

@@ -37,6 +37,9 @@ class OccupancyGrid:
         Side of a cell, m.
     T_map_grid : SE2
         Pose of the lower-left *corner* of cell (0, 0) in the map frame, yaw included.
+    unseen : ndarray of bool, shape (height, width), or None
+        Free cells that nobody has ever seen, where the file tells them apart: map savers write grey
+        205 for unknown, which the ``free_thresh: 0.25`` of others reads as free. Made read-only.
 
     Raises
     ------
@@ -47,6 +50,7 @@ class OccupancyGrid:
     cells: NDArray[np.int8]
     resolution: float
     T_map_grid: SE2 = field(default_factory=SE2.identity)
+    unseen: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         cells = np.ascontiguousarray(self.cells)
@@ -79,6 +83,14 @@ class OccupancyGrid:
         cells.flags.writeable = False
         object.__setattr__(self, "cells", cells)
         object.__setattr__(self, "resolution", float(self.resolution))
+        if self.unseen is not None:
+            if self.unseen.shape != cells.shape or self.unseen.dtype != np.bool_:
+                raise MapError(
+                    expected=f"unseen as bool of the shape of the cells, {cells.shape}",
+                    received=f"{self.unseen.dtype} of shape {self.unseen.shape}",
+                    remedy="leave it out if it is not known",
+                )
+            object.__setattr__(self, "unseen", _read_only(self.unseen.copy()))
 
     @property
     def height(self) -> int:
@@ -97,13 +109,24 @@ class OccupancyGrid:
 
     @cached_property
     def free(self) -> NDArray[np.bool_]:
-        """Where a robot can be, shape (height, width)."""
+        """Where there is no wall, by the thresholds, shape (height, width)."""
         return _read_only((self.cells >= FREE) & (self.cells <= FREE_UP_TO))
+
+    @cached_property
+    def seen_free(self) -> NDArray[np.bool_]:
+        """Where a robot can be: free, and not unseen, shape (height, width)."""
+        return self.free if self.unseen is None else _read_only(self.free & ~self.unseen)
+
+    @cached_property
+    def unknown(self) -> NDArray[np.bool_]:
+        """Where nobody has seen anything, shape (height, width)."""
+        unknown = self.cells == UNKNOWN
+        return _read_only(unknown if self.unseen is None else unknown | self.unseen)
 
     @property
     def free_area(self) -> float:
-        """Area of all free cells, m²."""
-        return float(np.count_nonzero(self.free)) * self.resolution**2
+        """Area of all cells where a robot can be, m²."""
+        return float(np.count_nonzero(self.seen_free)) * self.resolution**2
 
     def to_cells(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Take points of the map frame to continuous cell coordinates.

@@ -62,7 +62,7 @@ def greys(grid: OccupancyGrid, max_pixels: int) -> NDArray[np.uint8]:
     nobody knows before what is free.
     """
     grey = np.full(grid.cells.shape, GREY_UNKNOWN, np.uint8)
-    grey[grid.free] = GREY_FREE
+    grey[grid.seen_free] = GREY_FREE
     grey[grid.occupied] = GREY_WALL
     step = math.ceil(max(grey.shape) / max_pixels)
     if step == 1:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from firstfix.core.estimate import Hypothesis, LocateResult
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.evaluation.alike import Look, Place, doubles
 from firstfix.evaluation.figure import BLUE, GREEN, ORANGE, PURPLE, RED, new_figure, save_figure
 from firstfix.evaluation.fit import Fit, fit_of_hits
 from firstfix.evaluation.map_image import draw_map
@@ -22,6 +24,13 @@ if TYPE_CHECKING:
 ROBOT_M = 0.2
 LEAST_VIEW_M = 4.0
 LEAST_LABELLED = 0.005  # what would read "0 %" hides what matters
+
+LOOK_COLOURS = {
+    Look.FOUND: GREEN,
+    Look.ALIKE: ORANGE,
+    Look.LOST: PURPLE,
+    Look.MISTAKEN: RED,
+}
 
 FIT_STYLES = {
     Fit.AS_MAPPED: (GREEN, "as mapped"),
@@ -84,11 +93,22 @@ def draw_answer(
     return save_figure(figure, path)
 
 
-def draw_grid(grid: OccupancyGrid, path: Path, title: str) -> Path:
-    """Draw a map into a file; path, result and errors as in `draw_answer`."""
+def draw_grid(grid: OccupancyGrid, path: Path, title: str, places: Sequence[Place] = ()) -> Path:
+    """Draw a map into a file, and places by how they look; the rest is as in `draw_answer`."""
     figure = new_figure(10.0, 10.0)
     axes = figure.subplots()
     draw_map(axes, grid)
+    for look, colour in LOOK_COLOURS.items():
+        alike = np.array([[p.pose.x, p.pose.y] for p in places if p.look is look])
+        if len(alike):
+            label = f"{len(alike)} {look.value}"
+            axes.scatter(alike[:, 0], alike[:, 1], s=36, color=colour, label=label, zorder=5)
+    for pose, double in doubles(places):
+        axes.plot(
+            [pose.x, double.pose.x], [pose.y, double.pose.y], color=ORANGE, lw=0.8, ls=":", zorder=4
+        )
+    if places:
+        figure.legend(loc="outside lower center", ncols=len(LOOK_COLOURS))
     axes.set_title(title)
     return save_figure(figure, path)
 

@@ -119,5 +119,5 @@ def _cached_range_table(
     if cache_dir is None:
         return build()["ranges"]
     settings = repr((grid.resolution, SPACING_M, MAX_POSITIONS, DIRECTIONS, UNIT_M, REACH_M))
-    key = cache.content_key("range table 1", grid.occupied, grid.free, settings)
+    key = cache.content_key("range table 1", grid.occupied, grid.seen_free, settings)
     return cache.load_or_build(key, build, cache_dir)["ranges"]

@@ -80,10 +80,10 @@ def build_search_grid(grid: OccupancyGrid) -> SearchGrid:
     """
     # Even, so that the end-point field can have two cells to a block; 1 if cells are coarse.
     stride = max(1, 2 * round(SPACING_M / 2 / grid.resolution))
-    blocks = _free_blocks(grid.free, grid.occupied, stride)
+    blocks = _free_blocks(grid.seen_free, grid.occupied, stride)
     while np.count_nonzero(blocks) > MAX_POSITIONS:
         stride *= 2
-        blocks = _free_blocks(grid.free, grid.occupied, stride)
+        blocks = _free_blocks(grid.seen_free, grid.occupied, stride)
     rows, columns = (index.astype(np.int32) for index in np.nonzero(blocks))
     tiles_across = -(-blocks.shape[1] // TILE_COLUMNS)
     tile = (rows // TILE_ROWS).astype(np.int64) * tiles_across + columns // TILE_COLUMNS

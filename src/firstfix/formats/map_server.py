@@ -46,6 +46,7 @@ def load_map(path: str | os.PathLike[str], max_cells: int = DEFAULT_MAX_CELLS) -
     -------
     OccupancyGrid
         Row 0 is the bottom row of the image; the pose of its corner has the yaw of ``origin``.
+        Grey 205 that the thresholds call free stays free, and is marked unseen.
 
     Raises
     ------
@@ -56,11 +57,17 @@ def load_map(path: str | os.PathLike[str], max_cells: int = DEFAULT_MAX_CELLS) -
     image = open_image(header.image, max_cells)
     table = cell_table(header, image)
     cells = np.empty((image.height, image.width), np.int8)
+    meant_unknown = (table == FREE) & (image.levels * 255 == GREY_UNKNOWN * image.white)
+    unseen = np.zeros(cells.shape, np.bool_) if meant_unknown.any() else None
     for strip in image.strips():
         rows = slice(image.height - strip.bottom, image.height - strip.top)
         cells[rows] = to_cells(strip, table, header.mode)[::-1]
+        if unseen is not None:
+            unseen[rows] = meant_unknown[strip.codes][::-1]
+    if unseen is not None and unseen[cells == FREE].all():
+        unseen = None  # the whole floor is of this grey: someone drew it so
     cells.flags.writeable = False  # or the grid would copy them
-    return OccupancyGrid(cells, header.resolution, header.T_map_grid)
+    return OccupancyGrid(cells, header.resolution, header.T_map_grid, unseen)
 
 
 def save_map(grid: OccupancyGrid, yaml_path: str | os.PathLike[str]) -> Path:

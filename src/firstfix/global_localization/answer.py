@@ -14,7 +14,7 @@ from firstfix.core.se2 import SE2
 
 def check_searchable(grid: OccupancyGrid) -> None:
     """Raise MapError if a map has nothing to compare with, or nowhere to be."""
-    for kind, cells in (("occupied", grid.occupied), ("free", grid.free)):
+    for kind, cells in (("occupied", grid.occupied), ("free", grid.seen_free)):
         if not cells.any():
             raise MapError(
                 expected="a map with walls and free space",

@@ -125,7 +125,7 @@ def pose_scores(
     offsets = field.offsets(
         stride / 2 + cells * np.sin(angles), stride / 2 + cells * np.cos(angles)
     )
-    rows, columns = np.nonzero(_has_free_cell(fields.grid.free, stride))
+    rows, columns = np.nonzero(_has_free_cell(fields.grid.seen_free, stride))
     spans = _spans(rows.astype(np.int32), columns.astype(np.int32))
     best = np.empty((-(-fields.grid.height // stride), field.columns + _CHUNK), np.int64)
     _lowest(field.values, field.base(spans[0], spans[1]), spans, offsets, best)

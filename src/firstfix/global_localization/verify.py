@@ -92,7 +92,7 @@ def verify(poses: NDArray[np.float64], beams: Beams, fields: MapFields) -> Verif
         fields.clearance,
         fields.squares,
         fields.distances * np.float32(fields.grid.resolution),
-        fields.grid.cells,
+        fields.grid.unknown,
         fields.grid.resolution,
         scores,
         counts,
@@ -111,7 +111,7 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
     clearance: NDArray[np.uint8],
     squares: NDArray[np.uint16],
     distances_m: NDArray[np.float32],
-    cells: NDArray[np.int8],
+    unknown: NDArray[np.bool_],
     resolution: float,
     scores: NDArray[np.float64],
     counts: NDArray[np.int64],
@@ -146,7 +146,7 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
                 counts[k, THROUGH] += 1
             elif distance <= _EXPLAINED_M:
                 counts[k, EXPLAINED] += 1
-            elif not inside or cells[y, x] < 0:
+            elif not inside or unknown[y, x]:
                 counts[k, UNKNOWN] += 1
             else:
                 counts[k, SHORT] += 1

@@ -70,7 +70,14 @@ def identical_rooms(count: int) -> OccupancyGrid:
 def random_free_pose(
     grid: OccupancyGrid, rng: np.random.Generator, clearance_m: float = 0.3
 ) -> SE2:
-    """Draw a pose where a robot can stand, evenly over the map's free cells and all headings.
+    """Draw one pose where a robot can stand, as `random_free_poses` does."""
+    return random_free_poses(grid, rng, 1, clearance_m)[0]
+
+
+def random_free_poses(
+    grid: OccupancyGrid, rng: np.random.Generator, count: int, clearance_m: float = 0.3
+) -> list[SE2]:
+    """Draw poses where a robot can stand, evenly over the map's free cells and all headings.
 
     Parameters
     ----------
@@ -78,13 +85,15 @@ def random_free_pose(
         The map.
     rng : numpy.random.Generator
         Source of chance.
+    count : int
+        Number of poses.
     clearance_m : float
-        Half the side of the square around the pose that must be free, m, up to 254 cells.
+        Half the side of the square around a pose that must be free, m, up to 254 cells.
 
     Returns
     -------
-    SE2
-        ``T_map_base``.
+    list of SE2
+        ``T_map_base`` of each.
 
     Raises
     ------
@@ -92,7 +101,7 @@ def random_free_pose(
         If no place of the map is that free.
     """
     # Beyond the border of the map nothing is known to be free.
-    blocked = np.pad(~grid.free, 1, constant_values=True)
+    blocked = np.pad(~grid.seen_free, 1, constant_values=True)
     clearance_cells = chessboard_clearance(blocked)[1:-1, 1:-1]
     places = np.flatnonzero(clearance_cells > clearance_m / grid.resolution)
     if len(places) == 0:
@@ -101,7 +110,11 @@ def random_free_pose(
             received=f"a map of {grid.free_area:.1f} m² free area without one",
             remedy="use another map or less clearance",
         )
-    row, column = np.divmod(places[rng.integers(len(places))], grid.width)
+    return [_pose_in_cell(grid, rng, int(rng.choice(places))) for _ in range(count)]
+
+
+def _pose_in_cell(grid: OccupancyGrid, rng: np.random.Generator, index: int) -> SE2:
+    row, column = divmod(index, grid.width)
     x, y = grid.to_map(np.array([column, row]) + rng.uniform(0.0, 1.0, 2))
     return SE2(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
 
