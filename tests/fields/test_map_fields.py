@@ -63,7 +63,13 @@ def test_another_map_has_its_own_cache(grid, tmp_path):
     build_fields(grid, tmp_path)
     cells = grid.cells.copy()
     cells[50, 20] = OCCUPIED
-    for other in (OccupancyGrid(cells, 0.05), OccupancyGrid(grid.cells, 0.1)):
+    unseen = np.zeros(cells.shape, np.bool_)
+    unseen[5:15, 5:60] = True
+    for other in (
+        OccupancyGrid(cells, 0.05),
+        OccupancyGrid(grid.cells, 0.1),
+        OccupancyGrid(grid.cells, 0.05, unseen=unseen),
+    ):
         assert_equal(build_fields(other, None), build_fields(other, tmp_path))
 
 

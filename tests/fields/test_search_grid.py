@@ -22,9 +22,11 @@ hall = OccupancyGrid(np.zeros((300, 900), np.int8), 0.05)
 
 
 @settings(deadline=None)
-@given(cells, resolutions)
-def test_exactly_the_free_blocks_are_searched(cells, resolution):
-    grid = OccupancyGrid(cells, resolution)
+@given(cells, resolutions, st.sampled_from([None, 0.1, 0.5]), st.integers(0, 1000))
+def test_exactly_the_free_blocks_that_someone_has_seen_are_searched(cells, resolution, share, seed):
+    unseen = None if share is None else np.random.default_rng(seed).random(cells.shape) < share
+    grid = OccupancyGrid(cells, resolution, unseen=unseen)
+    free = grid.free if unseen is None else grid.free & ~unseen
     positions = build_search_grid(grid)
     found = set(zip(positions.rows.tolist(), positions.columns.tolist(), strict=True))
     stride = positions.stride
@@ -32,11 +34,9 @@ def test_exactly_the_free_blocks_are_searched(cells, resolution):
         for column in range(-(-grid.width // stride)):
             y, x = row * stride + stride // 2, column * stride + stride // 2
             inside = y < grid.height and x < grid.width
-            block = grid.free[
-                row * stride : (row + 1) * stride, column * stride : (column + 1) * stride
-            ]
+            block = free[row * stride : (row + 1) * stride, column * stride : (column + 1) * stride]
             mostly_free = 2 * np.count_nonzero(block) >= stride**2
-            searched = inside and not grid.occupied[y, x] and (grid.free[y, x] or mostly_free)
+            searched = inside and not grid.occupied[y, x] and (free[y, x] or mostly_free)
             assert ((row, column) in found) == searched
 
 

@@ -16,7 +16,6 @@ from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.answer import (
-    FEWEST_HITS,
     check_searchable,
     nothing_to_match,
     to_map,
@@ -91,12 +90,13 @@ def test_a_drawn_case():
 
 
 @settings(deadline=None)
-@given(st.integers(0, 30), st.integers(0, FEWEST_HITS - 1))
-def test_nothing_to_match_says_how_much_was_seen(n, hits):
+@given(st.integers(0, 30), st.integers(0, 7), st.integers(1, 8))
+def test_nothing_to_match_says_how_much_was_seen(n, hits, needed):
     scan = LaserScan(np.full(n + 1, np.nan, np.float32), 0.0, 0.1, 0.1, 5.0)
-    result = nothing_to_match(scan, hits, 0.25)
+    result = nothing_to_match(scan, hits, needed, 0.25)
     assert result.verdict is Verdict.NO_MATCH
     assert f"only {hits} of {n + 1} beams" in result.reason
+    assert f"{needed} are needed" in result.reason
     assert result.hypotheses == ()
     assert result.best is None
     assert not result.search.proven
@@ -109,6 +109,12 @@ def test_nothing_to_match_says_how_much_was_seen(n, hits):
 def test_a_map_of_one_kind_cannot_be_searched(value, missing):
     with pytest.raises(MapError, match=f"none of them {missing}"):
         check_searchable(OccupancyGrid(np.full((5, 7), value, np.int8), 0.05))
+
+
+def test_free_space_that_nobody_has_seen_is_no_place_to_be():
+    cells = np.array([[FREE, OCCUPIED]], np.int8)
+    with pytest.raises(MapError, match="none of them free"):
+        check_searchable(OccupancyGrid(cells, 0.05, unseen=np.array([[True, False]])))
 
 
 def test_one_wall_and_one_free_cell_can():

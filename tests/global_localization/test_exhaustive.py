@@ -115,6 +115,16 @@ def test_only_blocks_with_a_free_cell_are_tried():
     assert len(scores) == 2
 
 
+def test_blocks_that_nobody_has_seen_are_not_tried():
+    cells = np.zeros((4, 8), np.int8)
+    cells[0, 0] = OCCUPIED
+    unseen = np.zeros(cells.shape, np.bool_)
+    unseen[:, 4:] = True
+    fields = build_fields(OccupancyGrid(cells, 0.1, unseen=unseen), None)
+    tried, _ = pose_scores(random_hits(0, 3, 0.5), fields, FAST)
+    assert tried[:, :2].tolist() == [[2.0, 2.0]]
+
+
 def test_of_equal_headings_the_first_wins():
     cells = np.zeros((9, 9), np.int8)
     cells[4, 4] = OCCUPIED

@@ -57,6 +57,14 @@ def test_one_beam(yard, bearing, range_m, hit, kind):
     assert counts.tolist() == [[int(k == kind) for k in range(4)]]
 
 
+def test_what_nobody_has_seen_is_unknown_whatever_the_thresholds_say(yard):
+    unseen = np.zeros(yard.grid.cells.shape, np.bool_)
+    unseen[:, :70] = True  # up to x = 3.5 m; the beam ends at 3 m
+    grid = OccupancyGrid(yard.grid.cells, RESOLUTION, unseen=unseen)
+    counts = verify(SENSOR, beam(EAST, 1.0), build_fields(grid, None)).counts
+    assert counts[0, IN_UNKNOWN] == 1
+
+
 @pytest.mark.parametrize("quarter", range(4))
 def test_the_heading_turns_the_beams(yard, quarter):
     turn = quarter * np.pi / 2
