@@ -76,6 +76,56 @@ def test_map_check_warns_of_traps(cli, unique: Files, tmp_path: Path) -> None:
     assert "warning: mode is missing" in ended.out
 
 
+def test_map_check_finds_a_place_that_is_like_no_other(cli, unique: Files) -> None:
+    ended = cli("map", "check", unique[0], "--samples", 5)
+    assert ended.status == 0
+    assert "5 random places" in ended.out
+    assert "UNIQUE and right  100.0%" in ended.out
+    assert "~" not in ended.out
+
+
+def test_map_check_names_the_places_that_look_alike(cli, alike: Files) -> None:
+    ended = cli("map", "check", alike[0], "--samples", 12, "--beams", 180, "--seed", 1)
+    assert ended.status == 0
+    assert "AMBIGUOUS         100.0%" in ended.out
+    (*pairs, rest) = ended.out[ended.out.index("~") :].splitlines()[1:]
+    assert len(pairs) == 10
+    assert rest == "and 2 more"
+    for pair in pairs:
+        here, there = (side.split() for side in pair.split("~"))
+        assert abs(float(here[1]) - float(there[1])) == pytest.approx(8.0, abs=0.1)
+        assert there[-1] == "50.0%"
+
+
+def test_map_check_asks_before_it_works_long(
+    cli, unique: Files, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("firstfix.cli.alike.MOST_CELLS", 1000)
+    assert "ask for it with --samples 40" in cli("map", "check", unique[0]).out
+    assert "2 random places" in cli("map", "check", unique[0], "--samples", 2).out
+    assert cli("map", "check", unique[0], "--samples", 0).out.endswith("no traps found\n")
+
+
+@pytest.mark.parametrize(("grey", "word"), [(205, "free"), (254, "occupied")])
+def test_map_check_of_a_map_with_nothing_in_it(cli, tmp_path: Path, grey: int, word: str) -> None:
+    text = "image: blank.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\nmode: trinary\n"
+    text += "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    (tmp_path / "blank.yaml").write_text(text)
+    (tmp_path / "blank.pgm").write_bytes(b"P5 40 40 255\n" + bytes([grey]) * 1600)
+    ended = cli("map", "check", "blank.yaml")
+    assert (ended.status, ended.err) == (0, "")
+    assert "warning: " in ended.out
+    told = ended.out.splitlines()[-1]
+    assert told.startswith("which places look alike cannot be told: ")
+    assert word in told
+
+
+def test_map_show_marks_what_looks_alike(cli, alike: Files, tmp_path: Path) -> None:
+    for name, options in (("plain.png", []), ("marked.png", ["--alike", "--samples", 4])):
+        assert cli("map", "show", alike[0], "--plot", name, *options).status == 0
+    assert (tmp_path / "marked.png").read_bytes() != (tmp_path / "plain.png").read_bytes()
+
+
 def test_map_show_draws_here_and_never_over_the_map(cli, unique: Files, tmp_path: Path) -> None:
     ended = cli("map", "show", unique[0])
     assert ended.status == 0

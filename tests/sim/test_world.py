@@ -7,7 +7,14 @@ from scipy import ndimage
 from firstfix.core.errors import InputError, MapError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.sim.world import ROOM_PITCH, WORLDS, identical_rooms, office, random_free_pose
+from firstfix.sim.world import (
+    ROOM_PITCH,
+    WORLDS,
+    identical_rooms,
+    office,
+    random_free_pose,
+    random_free_poses,
+)
 
 
 @pytest.mark.parametrize("name", WORLDS)
@@ -73,6 +80,13 @@ def test_one_seed_gives_one_pose() -> None:
     grid = office()
     a, b = (random_free_pose(grid, np.random.default_rng(7)) for _ in range(2))
     assert a == b
+
+
+def test_many_poses_are_the_single_ones_in_turn() -> None:
+    one, many = (np.random.default_rng(7) for _ in range(2))
+    singles = [random_free_pose(office(), one) for _ in range(4)]
+    assert random_free_poses(office(), many, 4) == singles
+    assert random_free_poses(office(), many, 0) == []
 
 
 def test_a_map_without_a_place_to_stand_is_refused() -> None:

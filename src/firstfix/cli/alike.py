@@ -34,8 +34,8 @@ Samples = Annotated[
         "--samples",
         min=0,
         max=100_000,
-        help="Random places that are tried; 0 tries none. "
-        f"[default: {SAMPLES}; 0 if the map has more than {MOST_CELLS // 1_000_000} million cells]",
+        help="Random places that are tried; 0 tries none.",
+        show_default=f"{SAMPLES}, none above {MOST_CELLS // 1_000_000} million cells",
         rich_help_panel=PANEL,
     ),
 ]
@@ -145,7 +145,7 @@ def _lines(places: Sequence[Place]) -> list[str]:
     lines = [f"{look.value:<18}{share(places, look):6.1%}" for look in Look]
     pairs = doubles(places)
     if pairs:
-        lines += ["", "Places that look alike, and how likely the second is taken for the first:"]
+        lines += ["", "Where a scan was taken  ~  where else it fits, and how likely that is:"]
     lines += [
         f"{pose_text(pose)}  ~  {pose_text(double.pose)}  {double.probability:6.1%}"
         for pose, double in pairs[:MOST_PAIRS]

@@ -98,19 +98,32 @@ def draw_grid(grid: OccupancyGrid, path: Path, title: str, places: Sequence[Plac
     figure = new_figure(10.0, 10.0)
     axes = figure.subplots()
     draw_map(axes, grid)
+    _draw_places(axes, places)
+    if places:
+        figure.legend(loc="outside lower center", ncols=len(LOOK_COLOURS) + 1)
+    axes.set_title(title)
+    return save_figure(figure, path)
+
+
+def _draw_places(axes: Axes, places: Sequence[Place]) -> None:
     for look, colour in LOOK_COLOURS.items():
-        alike = np.array([[p.pose.x, p.pose.y] for p in places if p.look is look])
+        alike = np.array([[place.pose.x, place.pose.y] for place in places if place.look is look])
         if len(alike):
             label = f"{len(alike)} {look.value}"
             axes.scatter(alike[:, 0], alike[:, 1], s=36, color=colour, label=label, zorder=5)
-    for pose, double in doubles(places):
+    for i, (pose, double) in enumerate(doubles(places)):
         axes.plot(
-            [pose.x, double.pose.x], [pose.y, double.pose.y], color=ORANGE, lw=0.8, ls=":", zorder=4
+            [double.pose.x, pose.x],
+            [double.pose.y, pose.y],
+            color=ORANGE,
+            lw=0.8,
+            ls=":",
+            marker="o",
+            markevery=[0],
+            markerfacecolor="none",
+            label=None if i else "where else it fits",
+            zorder=4,
         )
-    if places:
-        figure.legend(loc="outside lower center", ncols=len(LOOK_COLOURS))
-    axes.set_title(title)
-    return save_figure(figure, path)
 
 
 def _draw_scan(axes: Axes, grid: OccupancyGrid, scan: LaserScan, T_map_base: SE2) -> None:
