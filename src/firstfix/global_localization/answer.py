@@ -10,6 +10,8 @@ from firstfix.core.estimate import LocateResult, SearchReport, Verdict
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import MapFields
+from firstfix.fields.search_grid import SPACING_M
 
 
 def check_searchable(grid: OccupancyGrid) -> None:
@@ -21,6 +23,17 @@ def check_searchable(grid: OccupancyGrid) -> None:
                 received=f"a map of {grid.width} x {grid.height} cells, none of them {kind}",
                 remedy="check its thresholds, negate and image with `firstfix map check`",
             )
+
+
+def check_positions(fields: MapFields) -> None:
+    """Raise MapError if free space is too narrow for any position of the search."""
+    if len(fields.positions) == 0:
+        raise MapError(
+            expected=f"free space {SPACING_M} m wide, for a robot to be in",
+            received=f"{np.count_nonzero(fields.grid.seen_free)} free cells of "
+            f"{fields.grid.resolution} m, nowhere together",
+            remedy="check resolution and thresholds with `firstfix map check`",
+        )
 
 
 def nothing_to_match(scan: LaserScan, hits: int, needed: int, elapsed_s: float) -> LocateResult:

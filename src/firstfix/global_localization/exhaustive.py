@@ -1,12 +1,14 @@
 """The paper's own method, exactly: the Manhattan score of every pose on a grid, the lowest wins.
 
 PoseScore (paper, eq. 3) is the sum over the beams of *pointscore*, the Manhattan distance from the
-cell a beam ends in to the nearest occupied cell. Beams without a return take no part. Positions are
+cell a beam ends in to the nearest occupied cell. Beams without a return, or longer than the map,
+take no part. Positions are
 cell centres and yaw follows REP 103 (docs/decisions/0002 translates the paper's equations).
 """
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 
@@ -46,6 +48,9 @@ FAST = PoseGrid(stride=4, headings=24)
 
 _HYPOTHESES = 10
 
+# No 2D LIDAR measures farther, and memory grows with the square of the longest beam.
+_LONGEST_M = 100.0
+
 # Rows are summed in whole vectors.
 _CHUNK = 32
 
@@ -69,7 +74,7 @@ def locate(scan: LaserScan, fields: MapFields, poses: PoseGrid) -> LocateResult:
         while the next lowest places are listed with probability 0; NO_MATCH if no beam hit.
     """
     started = time.perf_counter()
-    hits = usable_beams(scan, longest_m=float("inf")).hits()
+    hits = usable_beams(scan, longest_m=_longest(fields)).hits()
     if len(hits) == 0:
         return nothing_to_match(scan, 0, 1, time.perf_counter() - started)
     tried, scores = pose_scores(hits, fields, poses)
@@ -92,6 +97,12 @@ def locate(scan: LaserScan, fields: MapFields, poses: PoseGrid) -> LocateResult:
         search=SearchReport(len(tried) * poses.headings, 1.0, proven=True),
         elapsed_s=time.perf_counter() - started,
     )
+
+
+def _longest(fields: MapFields) -> float:
+    # A beam that is longer than the map ends outside it wherever the robot is.
+    grid = fields.grid
+    return min(_LONGEST_M, math.hypot(grid.width, grid.height) * grid.resolution)
 
 
 def pose_scores(

@@ -13,7 +13,12 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.fields.map_fields import MapFields, build_fields
 from firstfix.global_localization import exhaustive
-from firstfix.global_localization.answer import check_searchable, nothing_to_match, to_map
+from firstfix.global_localization.answer import (
+    check_positions,
+    check_searchable,
+    nothing_to_match,
+    to_map,
+)
 from firstfix.global_localization.beams import usable_beams
 from firstfix.global_localization.config import LocateConfig, Method
 from firstfix.global_localization.places import distinct_places
@@ -67,7 +72,9 @@ class Locator:
         self.method = method
         self.config = config or LocateConfig()
         self.fields = build_fields(grid, cache_dir)
-        if method is not Method.FAST:
+        if method is Method.FAST:
+            check_positions(self.fields)
+        else:
             _ = self.fields.pointscore  # part of the preparation, not of the first scan
 
     def locate(self, scan: LaserScan) -> LocateResult:
