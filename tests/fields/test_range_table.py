@@ -40,7 +40,7 @@ def random_grid(seed, shape, resolution):
 @settings(deadline=None, max_examples=30)
 @given(
     st.integers(0, 2**32 - 1),
-    st.tuples(st.integers(4, 40), st.integers(4, 40)),
+    st.tuples(st.integers(12, 40), st.integers(12, 40)),
     st.sampled_from([0.05, 0.1, 0.25]),
 )
 def test_every_entry_is_the_cast_range(seed, shape, resolution):
