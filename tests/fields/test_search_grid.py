@@ -4,20 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, reject, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from firstfix.core.errors import MapError
 from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.fields import search_grid
-from firstfix.fields.search_grid import (
-    SPACING_M,
-    TILE_COLUMNS,
-    TILE_ROWS,
-    SearchGrid,
-    build_search_grid,
-)
+from firstfix.fields.search_grid import SPACING_M, TILE_COLUMNS, TILE_ROWS, build_search_grid
 
 cells = arrays(
     np.int8,
@@ -28,26 +21,15 @@ resolutions = st.sampled_from([0.01, 0.02, 0.05, 0.1, 0.25])
 hall = OccupancyGrid(np.zeros((300, 900), np.int8), 0.05)
 
 
-def build_or_skip(grid: OccupancyGrid) -> SearchGrid:
-    try:
-        return build_search_grid(grid)
-    except MapError:
-        reject()
-
-
 @settings(deadline=None)
 @given(cells, resolutions, st.sampled_from([None, 0.1, 0.5]), st.integers(0, 1000))
 def test_exactly_the_free_blocks_that_someone_has_seen_are_searched(cells, resolution, share, seed):
     unseen = None if share is None else np.random.default_rng(seed).random(cells.shape) < share
     grid = OccupancyGrid(cells, resolution, unseen=unseen)
     free = grid.free if unseen is None else grid.free & ~unseen
-    try:
-        positions = build_search_grid(grid)
-    except MapError:
-        found, stride = set[tuple[int, int]](), max(1, 2 * round(SPACING_M / 2 / resolution))
-    else:
-        found = set(zip(positions.rows.tolist(), positions.columns.tolist(), strict=True))
-        stride = positions.stride
+    positions = build_search_grid(grid)
+    found = set(zip(positions.rows.tolist(), positions.columns.tolist(), strict=True))
+    stride = positions.stride
     for row in range(-(-grid.height // stride)):
         for column in range(-(-grid.width // stride)):
             y, x = row * stride + stride // 2, column * stride + stride // 2
@@ -62,7 +44,7 @@ def test_exactly_the_free_blocks_that_someone_has_seen_are_searched(cells, resol
 @given(cells, resolutions)
 def test_positions_are_centres_of_cells_without_a_wall(cells, resolution):
     grid = OccupancyGrid(cells, resolution)
-    positions = build_or_skip(grid)
+    positions = build_search_grid(grid)
     x, y = positions.centres(np.arange(len(positions)))
     assert (x % 1.0 == 0.5).all()
     assert (y % 1.0 == 0.5).all()
@@ -74,7 +56,7 @@ def test_positions_are_centres_of_cells_without_a_wall(cells, resolution):
 @settings(deadline=None)
 @given(cells, resolutions)
 def test_tiles_hold_every_position_once_in_order(cells, resolution):
-    positions = build_or_skip(OccupancyGrid(cells, resolution))
+    positions = build_search_grid(OccupancyGrid(cells, resolution))
     assert positions.tile_starts[0] == 0
     assert positions.tile_starts[-1] == len(positions)
     assert len(positions.tile_starts) == len(positions.tile_rows) + 1
@@ -88,12 +70,10 @@ def test_tiles_hold_every_position_once_in_order(cells, resolution):
     assert (np.diff(order) > 0).all()
 
 
-@pytest.mark.parametrize("shape", [(1, 30), (30, 2), (9, 9)])
-def test_free_space_without_a_position_is_refused(shape):
-    cells = np.full(shape, OCCUPIED, np.int8)
-    cells[0, 1] = FREE
-    with pytest.raises(MapError, match="free cells that fill no block"):
-        build_search_grid(OccupancyGrid(cells, 0.05))
+def test_a_map_without_free_space_has_no_position():
+    positions = build_search_grid(OccupancyGrid(np.full((9, 9), UNKNOWN, np.int8), 0.05))
+    assert len(positions) == 0
+    assert positions.tile_starts.tolist() == [0]
 
 
 @pytest.mark.parametrize("resolution", [0.01, 0.02, 0.025, 0.05, 0.1, 0.2, 0.25])

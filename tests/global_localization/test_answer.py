@@ -15,7 +15,9 @@ from firstfix.core.estimate import Verdict
 from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import build_fields
 from firstfix.global_localization.answer import (
+    check_positions,
     check_searchable,
     nothing_to_match,
     to_map,
@@ -119,3 +121,11 @@ def test_free_space_that_nobody_has_seen_is_no_place_to_be():
 
 def test_one_wall_and_one_free_cell_can():
     check_searchable(OccupancyGrid(np.array([[FREE, OCCUPIED]], np.int8), 0.05))
+
+
+def test_free_space_must_be_wide_enough_to_stand_in():
+    narrow = np.full((30, 30), OCCUPIED, np.int8)
+    narrow[:, 1] = FREE  # 5 cm wide
+    with pytest.raises(MapError, match="30 free cells"):
+        check_positions(build_fields(OccupancyGrid(narrow, 0.05), None))
+    check_positions(build_fields(OccupancyGrid(narrow, 0.25), None))

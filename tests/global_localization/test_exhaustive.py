@@ -21,7 +21,6 @@ from firstfix.global_localization import exhaustive
 from firstfix.global_localization.beams import Beams
 from firstfix.global_localization.exhaustive import BASIC, FAST, PoseGrid, pose_scores
 
-
 # As coarse as this, every free cell is a place to be, so that maps can be tiny.
 CELL_M = 0.25
 

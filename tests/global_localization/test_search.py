@@ -6,12 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, reject, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from firstfix.core.angles import FULL_TURN, angle_error
-from firstfix.core.errors import MapError
 from firstfix.core.grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.fields import endpoint_field, range_table
@@ -155,16 +154,16 @@ seeds = st.integers(0, 2**32 - 1)
     st.sampled_from([1, 7, ALL]),
 )
 def test_fast_equals_slow(seed, shape, resolution, n, hit_share, longest_m, shortlist):
-    try:
-        fields = build_fields(random_map(seed, *shape, resolution), None)
-    except MapError:  # no place to be
-        reject()
+    fields = build_fields(random_map(seed, *shape, resolution), None)
     beams = random_beams(seed, n, hit_share, longest_m)
     candidates, report = search(beams, fields, shortlist, math.inf)
     assert report.proven
-    assert report.searched == pytest.approx(1.0)
+    assert report.searched == pytest.approx(1.0) or len(fields.positions) == 0
     assert report.poses == len(fields.positions) * DIRECTIONS
-    assert_same(candidates, slow_search(beams, fields, shortlist))
+    if len(fields.positions):
+        assert_same(candidates, slow_search(beams, fields, shortlist))
+    else:
+        assert candidates.poses.shape == (0, 3)
 
 
 @pytest.mark.parametrize("n", range(1, 14))
