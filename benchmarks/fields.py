@@ -1,4 +1,4 @@
-"""Time what is computed once per map: distance transforms, ray casting, pyramid, cache.
+"""Time what is computed once per map: distance transforms, fields of the search, rays, cache.
 
 Prints one line a measurement: the median over the runs (and the fastest run), in ms; of the rays,
 in ns each. Rays start at random free positions and go in 120 directions, up to 25 m.
@@ -28,9 +28,11 @@ from firstfix.fields.distance import (
     truncated_distance,
     truncated_squares,
 )
-from firstfix.fields.free_space import free_positions
-from firstfix.fields.pyramid import min_pyramid
+from firstfix.fields.endpoint_field import build_endpoint_field
+from firstfix.fields.map_fields import build_fields
+from firstfix.fields.range_table import build_range_table
 from firstfix.fields.raycast import cast_ray, cast_ray_leaping
+from firstfix.fields.search_grid import build_search_grid
 from firstfix.formats.map_server import load_map
 
 POSITIONS = 5000
@@ -47,6 +49,7 @@ def main() -> None:
     grid = load_map(path / "map.yaml" if path.is_dir() else path)
     print(f"{path}: {grid.width} x {grid.height} cells, {arguments.runs} runs, median (fastest)")
     time_transforms(grid, arguments.runs)
+    time_search_fields(grid, arguments.runs)
     time_rays(grid, arguments.runs)
     time_cache(grid, arguments.runs)
 
@@ -59,9 +62,23 @@ def time_transforms(grid: OccupancyGrid, runs: int) -> None:
     show("truncated squares, 20 cells", runs, lambda: truncated_squares(occupied, 20))
     show("truncated squares, 63 cells", runs, lambda: truncated_squares(occupied, 63))
     show("chessboard clearance", runs, lambda: chessboard_clearance(occupied))
-    field = np.minimum(truncated_squares(occupied, 15), 255).astype(np.uint8)
-    show("pyramid of 5 levels", runs, lambda: min_pyramid(field, 5, 225))
-    show("free positions, stride 4", runs, lambda: free_positions(grid.free, 4))
+
+
+def time_search_fields(grid: OccupancyGrid, runs: int) -> None:
+    fields = build_fields(grid, None)
+    positions, resolution = fields.positions, grid.resolution
+    show("positions of the search", runs, lambda: build_search_grid(grid))
+    show(
+        "end-point field",
+        runs,
+        lambda: build_endpoint_field(fields.squares, resolution, positions.stride, REACH_M),
+    )
+    show(
+        "table of expected ranges",
+        runs,
+        lambda: build_range_table(fields.clearance, resolution, positions),
+    )
+    show("all fields of a map", runs, lambda: build_fields(grid, None))
 
 
 def time_rays(grid: OccupancyGrid, runs: int) -> None:
