@@ -104,6 +104,7 @@ def test_a_picture_without_matplotlib(cli, unique: Files, monkeypatch: pytest.Mo
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     assert_one_line(cli("locate", *unique, "--plot", "a.png"), "firstfix[plot]")
     assert_one_line(cli("bench", unique[0].parent, "--report", "out"), "firstfix[plot]")
+    assert_one_line(cli("map", "show", unique[0]), "firstfix[plot]")
 
 
 def test_a_world_that_is_none(cli) -> None:

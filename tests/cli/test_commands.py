@@ -1,6 +1,7 @@
 """The other commands."""
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -148,6 +149,17 @@ def test_the_demo_tells_a_story_that_ends_well(cli, tmp_path: Path, world: str, 
         assert word in ended.out
     assert end in ended.out.splitlines()[-1]
     assert (tmp_path / "firstfix-demo.png").stat().st_size > 5000
+
+
+def test_the_demo_without_matplotlib_tells_its_story_all_the_same(
+    cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    ended = cli("demo", "--seed", 3)
+    assert (ended.status, ended.err) == (0, "")
+    assert "pip install 'firstfix[plot]'" in ended.out
+    assert "found" in ended.out.splitlines()[-1]
+    assert not (tmp_path / "firstfix-demo.png").exists()
 
 
 def test_the_demo_takes_a_map_of_ones_own(cli, unique: Files) -> None:

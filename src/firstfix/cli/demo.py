@@ -38,7 +38,7 @@ def demo(
     Exit status 0 if the default method is right: its one place is the true one, or it says that
     several places fit and gives the true one at least 5 %. Else 1.
     """
-    from firstfix.evaluation.figure import check_path
+    from firstfix.evaluation.figure import can_draw, check_path
     from firstfix.evaluation.picture import draw_answer
 
     check_path(plot)
@@ -50,7 +50,10 @@ def demo(
     truth, scan = _wake_up(grid, seed)
     _tell(grid, scan, truth, Method.PAPER, "the paper's, every 4 x 4 block x 24 headings")
     result = _tell(grid, scan, truth, Method.FAST, "default")
-    typer.echo(f"\nPicture    {draw_answer(grid, scan, result, plot, truth)}")
+    picture = "none, because matplotlib is missing: pip install 'firstfix[plot]'"
+    if can_draw():
+        picture = f"{draw_answer(grid, scan, result, plot, truth)}"
+    typer.echo(f"\nPicture    {picture}")
     if not _conclude(result, truth):
         raise typer.Exit(NOT_FOUND)
 

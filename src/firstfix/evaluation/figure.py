@@ -34,6 +34,15 @@ def check_path(path: Path) -> None:
         )
 
 
+def can_draw() -> bool:
+    """Tell whether matplotlib is installed."""
+    try:
+        import matplotlib.figure  # noqa: F401 - only whether it is there
+    except ImportError:
+        return False
+    return True
+
+
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure of a size in inches.
 
