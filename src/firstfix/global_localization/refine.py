@@ -39,6 +39,8 @@ _WALL_DEPTH_SIGMA = 0.25
 
 # Neighbouring beams err together (the same wall drawn askew); this many beams say as much as one.
 _BEAMS_PER_WITNESS = 4.0
+# However many beams agree, a map is not truer than a quarter of a cell and a tenth of a degree.
+_MAP_COVARIANCE = np.diag([0.25**2, 0.25**2, math.radians(0.1) ** 2])
 
 
 def refine_on_field(
@@ -120,7 +122,7 @@ def refine_on_rays(
     )
     # The depth of the walls is not asked for: invert first, then leave it out.
     covariances = np.linalg.inv(information)[:, :3, :3] * variances[:, None, None]
-    return refined, covariances * _BEAMS_PER_WITNESS
+    return refined, covariances * _BEAMS_PER_WITNESS + _MAP_COVARIANCE
 
 
 @njit(cache=True, nogil=True)
