@@ -1,6 +1,7 @@
 """What several test rooms share."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,3 +15,12 @@ def shared() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no folder {folder}: set FIRSTFIX_SHARED to the one with the recorded data")
     return folder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Keep prepared maps of tests, and of the processes they start, out of the user's cache."""
+    folder = tmp_path_factory.mktemp("firstfix-cache")
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("FIRSTFIX_CACHE_DIR", str(folder))
+        yield folder

@@ -12,8 +12,11 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "firstfix", *(str(argument) for argument in arguments)]
 
 
-def test_a_program_reads_json_from_a_pipe_and_nothing_else(unique: Files) -> None:
+def test_a_program_reads_json_from_a_pipe_and_nothing_else(
+    unique: Files, cache_of_its_own: Path
+) -> None:
     ended = subprocess.run(command("locate", *unique, "--json"), capture_output=True, check=True)
+    assert any(cache_of_its_own.iterdir())  # and not the user's
     assert json.loads(ended.stdout)["verdict"] == "UNIQUE"
     assert ended.stderr == b""
 
