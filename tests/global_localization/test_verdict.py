@@ -19,7 +19,7 @@ THROUGH = Evidence(explained=0.3, short=0.1, through_wall=0.6, unknown=0.0, beam
 
 @given(costs)
 def test_probabilities_are_shares_that_leave_room_for_another_place(scores):
-    p = place_probabilities(scores)
+    p = place_probabilities(scores, 180)
     assert p.shape == scores.shape
     assert ((p >= 0.0) & (p <= 1.0)).all()
     assert p.sum() <= 1.0 + 1e-12
@@ -27,7 +27,7 @@ def test_probabilities_are_shares_that_leave_room_for_another_place(scores):
 
 @given(costs)
 def test_a_lower_cost_is_more_likely_and_an_equal_one_equally(scores):
-    p = place_probabilities(scores)
+    p = place_probabilities(scores, 180)
     assert (np.diff(p) <= 0.0).all()
     same = np.diff(scores) == 0.0
     assert (np.diff(p)[same] == 0.0).all()
@@ -37,15 +37,15 @@ def test_a_lower_cost_is_more_likely_and_an_equal_one_equally(scores):
 def test_the_order_of_places_does_not_matter(scores, order):
     order = [i for i in order if i < len(scores)]
     np.testing.assert_allclose(
-        place_probabilities(scores[order]), place_probabilities(scores)[order], rtol=1e-9
+        place_probabilities(scores[order], 180), place_probabilities(scores, 180)[order], rtol=1e-9
     )
 
 
 @given(costs, st.floats(0.0, 8.0))
 def test_another_place_takes_its_share_from_all_alike(scores, cost):
     """The ratio of two places does not depend on what else is listed."""
-    before = place_probabilities(scores)
-    after = place_probabilities(np.append(scores, cost))[:-1]
+    before = place_probabilities(scores, 180)
+    after = place_probabilities(np.append(scores, cost), 180)[:-1]
     assert (after <= before + 1e-12).all()
     likely = before > 1e-200
     ratio = after[likely] / before[likely]
@@ -57,19 +57,19 @@ def test_a_place_that_fits_worse_becomes_less_likely(scores, i, more):
     i %= len(scores)
     worse = scores.copy()
     worse[i] += more
-    assert place_probabilities(worse)[i] <= place_probabilities(scores)[i]
+    assert place_probabilities(worse, 180)[i] <= place_probabilities(scores, 180)[i]
 
 
 @pytest.mark.parametrize("n", [2, 3, 8])
 def test_n_equal_places_share_alike(n):
-    p = place_probabilities(np.full(n, 0.2))
+    p = place_probabilities(np.full(n, 0.2), 180)
     assert (p == p[0]).all()
     assert 0.9 / n < p[0] <= 1.0 / n
 
 
 def test_one_clear_place_is_nearly_certain_and_a_bad_one_is_nearly_nowhere():
-    assert place_probabilities(np.array([0.1, 1.5]))[0] > 0.95
-    assert place_probabilities(np.array([4.0, 4.0])).sum() < 0.05
+    assert place_probabilities(np.array([0.1, 1.5]), 180)[0] > 0.95
+    assert place_probabilities(np.array([4.0, 4.0]), 180).sum() < 0.05
 
 
 def judged(p, evidence=GOOD, limit=0.8):
@@ -114,3 +114,13 @@ def test_every_result_is_judged_in_words(shares, limit, evidence):
     verdict, reason = judge(p, evidence, limit)
     assert (verdict is Verdict.UNIQUE) == (p[0] >= limit)
     assert reason
+
+
+def test_fewer_beams_are_less_sure():
+    scores = np.array([0.2, 0.4, 0.6])
+    sure = [place_probabilities(scores, beams)[0] for beams in (8, 10, 20, 30)]
+    assert sure == sorted(sure)
+    assert sure[0] < 0.9 < sure[-1]
+    np.testing.assert_array_equal(
+        place_probabilities(scores, 30), place_probabilities(scores, 2000)
+    )

@@ -40,7 +40,7 @@ class LocateConfig:
     budget_s: float = 30.0
     shortlist: int = 200
     hypotheses: int = 24
-    unique_probability: float = 0.9
+    unique_probability: float = 0.92
 
     def __post_init__(self) -> None:
         for name, least, most in (

@@ -126,14 +126,14 @@ def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateRe
     poses = poses[distinct_places(poses, first_look.scores, resolution, _SECOND_LOOK_PLACES)]
     second_look = verify(poses, beams, fields)
     ranked = distinct_places(poses, second_look.scores, resolution, config.hypotheses)
-    poses = poses[ranked[: _worth_listing(second_look.scores[ranked])]]
+    poses = poses[ranked[: _worth_listing(second_look.scores[ranked], len(beams))]]
     on_rays, covariances = refine_on_rays(poses, beams, fields)
     # Rays are sharper, but in a map with smeared walls they can do harm: the better pose stays.
     poses = np.concatenate([on_rays, poses])
     covariances = np.concatenate([covariances, covariances])
     verification = verify(poses, beams, fields)
     ranked = distinct_places(poses, verification.scores, resolution, config.hypotheses)
-    probabilities = place_probabilities(verification.scores[ranked])
+    probabilities = place_probabilities(verification.scores[ranked], len(beams))
 
     hypotheses = tuple(
         Hypothesis(
@@ -148,8 +148,8 @@ def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateRe
     return LocateResult(verdict, reason, hypotheses, report, time.perf_counter() - started)
 
 
-def _worth_listing(scores: NDArray[np.float64]) -> int:
-    probabilities = place_probabilities(scores)
+def _worth_listing(scores: NDArray[np.float64], beams: int) -> int:
+    probabilities = place_probabilities(scores, beams)
     rivals = int(np.count_nonzero(probabilities >= _RIVAL_SHARE * probabilities[0]))
     return max(_LISTED_PLACES, rivals)
 

@@ -10,22 +10,26 @@ from firstfix.core.estimate import Evidence, Verdict
 # How noisy this scan is in this map (people, moved chairs, a careless drawing) is not known
 # beforehand. Left open, it makes the likelihood of a place a power of its mean cost (the marginal
 # over an unknown scale, as Student's t comes from Gauss): what counts is the ratio of two costs,
-# not their difference. The exponent is half the number of independent things that a scan sees; the
-# floor is the cost of noise alone. docs/decisions/0005 has the measurement behind all three.
+# not their difference. The exponent is half the number of independent things that a scan sees,
+# fewer if it has few beams; the floor is the cost of noise alone. docs/decisions/0005 has the
+# measurements.
 _EXPONENT = 12.0
+_BEAMS_FOR_EXPONENT = 30
 _FLOOR = 0.2
 
 # Mean cost at which the best place of a wrong map begins to be as good as the right one.
 _WRONG_MAP_COST = 2.3
 
 
-def place_probabilities(scores: NDArray[np.float64]) -> NDArray[np.float64]:
+def place_probabilities(scores: NDArray[np.float64], beams: int) -> NDArray[np.float64]:
     """Turn the costs of separate places into probabilities.
 
     Parameters
     ----------
     scores : ndarray, shape (n,)
         Mean cost of a beam at each place, nats.
+    beams : int
+        Number of beams behind each mean.
 
     Returns
     -------
@@ -33,7 +37,8 @@ def place_probabilities(scores: NDArray[np.float64]) -> NDArray[np.float64]:
         Probability of each place; what is missing to 1 is that of a place that is not listed.
     """
     costs = np.append(scores, _WRONG_MAP_COST) + _FLOOR
-    likelihoods: NDArray[np.float64] = (costs.min() / costs) ** _EXPONENT
+    exponent = _EXPONENT * min(1.0, beams / _BEAMS_FOR_EXPONENT)
+    likelihoods: NDArray[np.float64] = (costs.min() / costs) ** exponent
     likelihoods /= likelihoods.sum()
     return likelihoods[:-1]
 
