@@ -26,6 +26,8 @@ check: $(STAMP)
 	$(BIN)/python -m pytest -n 2 -q -m "not slow" $(TEST_ARGS)
 
 bench: $(STAMP)
+	$(if $(strip $(CASES)),,$(error expected cases in ../shared/cases, received none; \
+	    name folders with map.yaml and scans.npz: make bench CASES="folder ..."))
 	$(BIN)/firstfix bench $(CASES) --method fast --method paper --foreign --json out/bench.json --report out/bench
 
 clean:
