@@ -419,6 +419,17 @@ def test_only_the_first_scans_are_read_on_request(bag: Bag) -> None:
         load_bag(path)
 
 
+def test_the_first_scans_are_the_first_by_stamp(bag: Bag) -> None:
+    late = [3.0, 1.0, 5.0, 2.0, 4.0, 6.0]
+    for i, stamp in enumerate(late):
+        bag.scan(stamp, at=10.0 + i)
+    path = bag.write()
+    for n in range(1, len(late) + 1):
+        recording = load_bag(path, max_scans=n)
+        assert [scan.stamp for scan in recording.scans] == sorted(late)[:n]
+        assert "sorted by stamp" in recording.notes[-1]
+
+
 def test_a_scan_of_another_definition_is_refused(ros1: Bag) -> None:
     ros1.scan(1.0)
     path = ros1.write()

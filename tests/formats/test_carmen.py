@@ -17,6 +17,7 @@ from firstfix.core.scan import Mounting
 from firstfix.core.se2 import SE2
 from firstfix.formats import log_lines
 from firstfix.formats.carmen import load_carmen
+from firstfix.formats.stamps import SORTED_AHEAD
 
 Write = Callable[..., Path]
 
@@ -272,13 +273,24 @@ def test_a_file_that_is_not_packed_is_told(tmp_path: Path) -> None:
 
 
 def test_only_what_is_asked_for_is_read(write: Write) -> None:
-    path = write(*driven(30), "x" * (log_lines.MAX_LINE_BYTES + 9))
+    path = write(*driven(2 + SORTED_AHEAD), "x" * (log_lines.MAX_LINE_BYTES + 9))
     recording = load_carmen(path, max_scans=2)
     assert len(recording) == 2
     assert recording.odometry is not None
     assert len(recording.odometry) == 2
     with pytest.raises(ScanError, match="in lines of at most"):
         load_carmen(path)
+
+
+def test_the_first_scans_are_the_first_by_stamp(write: Write) -> None:
+    late = [3.0, 0.0, 5.0, 1.0, 4.0, 2.0, 6.0]
+    path = write(*(old_laser(robot=f"{t} 0 0", laser=f"{t} 0 0", stamp=str(t)) for t in late))
+    for n in range(1, len(late) + 1):
+        recording = load_carmen(path, max_scans=n)
+        assert [scan.stamp for scan in recording.scans] == sorted(late)[:n]
+        assert recording.odometry is not None
+        assert recording.odometry.poses[:, 0].tolist() == sorted(late)[:n]
+        assert "sorted by stamp" in recording.notes[-1]
 
 
 def test_a_bomb_is_refused(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,7 +22,7 @@ from firstfix.formats.messages import (
 )
 from firstfix.formats.scan_errors import MAX_SCANS, check_max_scans, located, too_many_scans
 from firstfix.formats.sensor_place import SensorPlace, place_of, unknown_place
-from firstfix.formats.stamps import ascending, sorting_notes
+from firstfix.formats.stamps import SORTED_AHEAD, ascending, sorting_notes
 from firstfix.formats.tf_tree import TransformTree
 
 # How long after the last wanted scan its transforms are still looked for: they arrive later than
@@ -35,6 +35,11 @@ class _Sweep(NamedTuple):
 
     time_ns: int
     message: Any
+
+    @property
+    def stamp(self) -> float:
+        """Seconds; a driver that does not stamp its scans sends zero."""
+        return to_seconds(self.message.header.stamp) or 1e-9 * self.time_ns
 
 
 def load_bag(
@@ -55,7 +60,7 @@ def load_bag(
     topic : str or None
         Topic of the scans; None for the only one, or ``scan`` of several.
     max_scans : int or None
-        Read only the first ones.
+        Only the first ones by stamp.
 
     Returns
     -------
@@ -71,18 +76,22 @@ def load_bag(
     n_most = check_max_scans(max_scans)
     with located(f"{path}"), BagFile(path) as bag:
         topic = _scan_topic(bag, topic)
-        sweeps = [_Sweep(*item) for item in islice(bag.messages(SCAN, [topic]), n_most + 1)]
-        if max_scans is None and len(sweeps) > MAX_SCANS:
+        messages = islice(bag.messages(SCAN, [topic]), n_most + SORTED_AHEAD)
+        read = [_Sweep(*item) for item in messages]
+        if max_scans is None and len(read) > MAX_SCANS:
             raise too_many_scans(path)
-        until_ns = sweeps[n_most - 1].time_ns + AFTER_LAST_SCAN_NS if sweeps[n_most:] else None
-        sweeps = sweeps[:n_most]
-        if not sweeps:
+        if not read:
             raise _no_scan(topic)
+        order = ascending(np.array([sweep.stamp for sweep in read]))
+        sweeps = [read[i] for i in order[:n_most].tolist()]
+        until_ns = None
+        if len(sweeps) < len(read):
+            until_ns = max(sweep.time_ns for sweep in sweeps) + AFTER_LAST_SCAN_NS
         tree = _transforms(bag, until_ns)
         frames = sorted({to_frame(sweep.message.header.frame_id) for sweep in sweeps})
         base, odometry, notes = _odometry(bag, tree, frames[0], until_ns)
         places = {frame: _place(tree, base, frame, frames) for frame in frames}
-        return _recording(topic, sweeps, places, odometry, notes)
+        return _recording(topic, sweeps, places, odometry, [*notes, *sorting_notes(order)])
 
 
 def _scan_topic(bag: BagFile, topic: str | None) -> str:
@@ -159,29 +168,20 @@ def _recording(
     odometry: Trajectory | None,
     notes: list[str],
 ) -> Recording:
-    stamped = [to_seconds(sweep.message.header.stamp) for sweep in sweeps]
-    # A driver that does not stamp its scans sends zero.
-    stamps = np.array([s or 1e-9 * sweep.time_ns for s, sweep in zip(stamped, sweeps, strict=True)])
-    unstamped = stamped.count(0.0)
-    order = ascending(stamps)
     scans: list[LaserScan] = []
-    for i in order.tolist():
-        message = sweeps[i].message
-        place = places[to_frame(message.header.frame_id)]
+    for i, sweep in enumerate(sweeps):
+        place = places[to_frame(sweep.message.header.frame_id)]
         with located(f"scan {i} on {topic}"):
             scans.append(
                 to_laser_scan(
-                    message,
+                    sweep.message,
                     T_base_laser=place.T_base_laser,
                     mounting=place.mounting,
-                    stamp=float(stamps[i]),
+                    stamp=sweep.stamp,
                 )
             )
+    unstamped = sum(to_seconds(sweep.message.header.stamp) == 0.0 for sweep in sweeps)
     if unstamped:
         notes = [*notes, f"{unstamped} scan(s) have no stamp: the time of recording was taken"]
     placing = [note for place in places.values() for note in place.notes]
-    return Recording(
-        scans=tuple(scans),
-        odometry=odometry,
-        notes=(*placing, *notes, *sorting_notes(order)),
-    )
+    return Recording(scans=tuple(scans), odometry=odometry, notes=(*placing, *notes))

@@ -16,10 +16,7 @@ from firstfix.formats.carmen_lines import PARSERS, ScanLine
 from firstfix.formats.carmen_log import CarmenLog, read_log
 from firstfix.formats.carmen_mounting import mounted_at
 from firstfix.formats.scan_errors import MAX_SCANS, check_max_scans, located, too_many_scans
-from firstfix.formats.stamps import ascending, sorting_notes
-
-# A sensor's place and a SLAM correction look alike in a single line.
-MIN_SCANS_READ = 20
+from firstfix.formats.stamps import SORTED_AHEAD, ascending, sorting_notes
 
 KINDS = tuple(PARSERS)
 
@@ -40,7 +37,7 @@ def load_carmen(
     kind : str or None
         FLASER, ROBOTLASER1 or RLASER; None for the first of these that the log has.
     max_scans : int or None
-        Read only the first ones.
+        Only the first ones by stamp.
 
     Returns
     -------
@@ -60,17 +57,19 @@ def load_carmen(
             remedy="choose one of them, or none for the first that the log has",
         )
     n_most = check_max_scans(max_scans)
-    n_read = MAX_SCANS + 1 if max_scans is None else max(n_most, MIN_SCANS_READ)
-    log = read_log(path, KINDS if kind is None else (kind,), n_read)
+    # Some more than are wanted: scans may be late, and in a single line the place of a sensor and
+    # a SLAM correction look alike.
+    log = read_log(path, KINDS if kind is None else (kind,), n_most + SORTED_AHEAD)
     if max_scans is None and len(log.scans) > MAX_SCANS:
         raise too_many_scans(path)
     T_base_laser, mounting_notes = mounted_at(log.kind, log.scans, log.params)
-    stamps, stamp_notes = _stamps(log.scans[:n_most])
+    stamps, stamp_notes = _stamps(log.scans)
     order = ascending(stamps)
+    first = order[:n_most]
     with located(f"{path}"):
         return Recording(
-            scans=_scans(log, stamps, order, T_base_laser),
-            odometry=_odometry(log, stamps, order),
+            scans=_scans(log, stamps, first, T_base_laser),
+            odometry=_odometry(log, stamps, first),
             notes=(*_log_notes(log), *mounting_notes, *stamp_notes, *sorting_notes(order)),
         )
 

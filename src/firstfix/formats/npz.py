@@ -42,7 +42,7 @@ def load_npz(path: str | Path, *, max_scans: int | None = None) -> Recording:
     path : str or Path
         The file.
     max_scans : int or None
-        Read only the first ones.
+        Only the first ones by stamp.
 
     Returns
     -------

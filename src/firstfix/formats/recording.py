@@ -25,7 +25,7 @@ def load_recording(
         Topic of the scans in a bag, or FLASER, RLASER, ROBOTLASER1 in a CARMEN log; None to
         choose.
     max_scans : int or None
-        Read only the first ones.
+        Only the first ones by stamp.
 
     Returns
     -------

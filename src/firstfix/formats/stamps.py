@@ -5,6 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+# Who asks for the first scans of a log gets the first by stamp, as if all had been read and sorted,
+# unless one was recorded more than so many scans too late.
+SORTED_AHEAD = 100
+
 
 def ascending(stamps: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return the order that sorts stamps, shape (n,); equal stamps keep theirs."""
