@@ -59,6 +59,11 @@ class MapFields:
     ranges: NDArray[np.uint8]
 
     @cached_property
+    def layouts(self) -> dict[tuple[int, int], PhasedField]:
+        """The last layout of ``pointscore``, by its stride and margin: dear to make, kept."""
+        return {}
+
+    @cached_property
     def distances(self) -> NDArray[np.float32]:
         """Distance for every value of ``squares``, shape (near² + 1,), cells."""
         return np.sqrt(np.arange(self.near**2 + 1)).astype(np.float32)

@@ -20,7 +20,7 @@ from firstfix.core.angles import FULL_TURN
 from firstfix.core.estimate import Hypothesis, LocateResult, SearchReport, Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.fields.map_fields import MapFields
-from firstfix.fields.phased_field import lay_out
+from firstfix.fields.phased_field import PhasedField, lay_out
 from firstfix.global_localization.answer import nothing_to_match, to_map
 from firstfix.global_localization.beams import Beams, usable_beams
 from firstfix.global_localization.places import distinct_places
@@ -50,6 +50,9 @@ _HYPOTHESES = 10
 
 # No 2D LIDAR measures farther, and memory grows with the square of the longest beam.
 _LONGEST_M = 100.0
+
+# Eight of these fit uint16: twice as many to a vector as uint32.
+_SUMMED_NARROW = 65535 // 8
 
 # Rows are summed in whole vectors.
 _CHUNK = 32
@@ -129,8 +132,7 @@ def pose_scores(
     """
     stride, headings = poses.stride, poses.headings
     cells = hits.ranges / fields.grid.resolution
-    margin = int(np.ceil(cells.max() / stride)) + 1
-    field = lay_out(_continued(fields.pointscore, margin * stride), 1, stride, margin)
+    field = _pointscore_field(fields, stride, float(cells.max()))
     angles = hits.bearings + np.arange(headings)[:, None] * (FULL_TURN / headings)
     # The centre of a block of even side is a corner of cells: the cell above and right of it.
     offsets = field.offsets(
@@ -149,6 +151,21 @@ def pose_scores(
         ]
     )
     return tried, word // headings
+
+
+def _pointscore_field(fields: MapFields, stride: int, longest_cells: float) -> PhasedField:
+    # Doubling margins: scans of one sensor, longest beams a little different, share one layout.
+    margin = 64
+    while margin * stride <= longest_cells + stride:
+        margin *= 2
+    key = (stride, margin)
+    if key not in fields.layouts:
+        fields.layouts.clear()
+        around = _continued(fields.pointscore, margin * stride)
+        if around.max() > _SUMMED_NARROW:
+            around = around.astype(np.uint32)
+        fields.layouts[key] = lay_out(around, 1, stride, margin)
+    return fields.layouts[key]
 
 
 def _continued(pointscore: NDArray[np.uint16], margin: int) -> NDArray[np.uint16]:
@@ -189,8 +206,12 @@ def _lowest(
     offsets: NDArray[np.int64],
     best: NDArray[np.int64],
 ) -> None:
-    """Lowest ``PoseScore * headings + heading`` of every block in the spans."""
+    """Lowest ``PoseScore * headings + heading`` of every block in the spans.
+
+    Eight values must fit the type of the values.
+    """
     headings, beams = offsets.shape
+    narrow = values.dtype.type
     sums = np.empty(best.shape[1], np.uint32)
     for s in range(spans.shape[1]):
         first, base = spans[1, s], bases[s]
@@ -212,11 +233,9 @@ def _lowest(
                 for chunk in range(chunks):
                     for k in range(32):
                         x = chunk * 32 + k
-                        p = np.uint32(np.uint32(a[x]) + np.uint32(b[x]))
-                        q = np.uint32(np.uint32(c[x]) + np.uint32(d[x]))
-                        r = np.uint32(np.uint32(e[x]) + np.uint32(f[x]))
-                        t = np.uint32(np.uint32(g[x]) + np.uint32(j[x]))
-                        sums[x] += np.uint32(np.uint32(p + q) + np.uint32(r + t))
+                        p = narrow(narrow(a[x] + b[x]) + narrow(c[x] + d[x]))
+                        q = narrow(narrow(e[x] + f[x]) + narrow(g[x] + j[x]))
+                        sums[x] += np.uint32(narrow(p + q))
                 i += 8
             while i < beams:
                 a = values[base + offsets[h, i] :]
