@@ -29,7 +29,7 @@ def bench(
     ],
     method: Annotated[
         list[Method] | None,
-        typer.Option(help="Which method; may be given several times. [default: fast]"),
+        typer.Option(help="Which method; may be given several times.", show_default="fast"),
     ] = None,
     json_file: Annotated[
         Path | None,
@@ -49,8 +49,8 @@ def bench(
     """Locate every scan of every case and compare with the truth.
 
     Times are processor time of one scan, kernels compiled, map prepared; memory is the peak of a
-    process that does nothing else. The totals `total` and `foreign` of the JSON are those of the
-    first --method; `totals` has one for each.
+    process that does nothing else. The totals 'total' and 'foreign' of the JSON are those of
+    the first --method; 'totals' has one for each.
     """
     from firstfix.cli.cases import find_cases
     from firstfix.evaluation import bench as runner
@@ -77,7 +77,9 @@ def bench(
     if json_file is not None:
         with _writing(json_file):
             text = json.dumps(document, indent=2, allow_nan=False)
-            json_file.write_text(text + "\n", encoding="utf-8")
+            draft = json_file.with_name(f".{json_file.name}.draft")
+            draft.write_text(text + "\n", encoding="utf-8")
+            draft.replace(json_file)
     if report is not None:
         from firstfix.evaluation.report import write_report
 
@@ -93,7 +95,10 @@ def _check_targets(json_file: Path | None, report: Path | None) -> None:
     if json_file is not None:
         with _writing(json_file):
             json_file.parent.mkdir(parents=True, exist_ok=True)
+            is_new = not json_file.exists()
             json_file.open("a").close()  # earlier figures stay until there are new ones
+            if is_new:
+                json_file.unlink()
     if report is not None:
         from firstfix.evaluation.figure import new_figure
 
