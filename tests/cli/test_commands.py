@@ -19,6 +19,21 @@ def test_help_names_every_command(cli) -> None:
         assert cli(command, "--help").status == 0
 
 
+@pytest.mark.parametrize(
+    ("command", "default"),
+    [
+        (["locate"], "default: (0)"),
+        (["bench"], "default: (fast)"),
+        (["map", "show"], "default: (firstfix-NAME.png here)"),
+        (["map", "check"], "default: (40, none above 10 million cells)"),
+    ],
+)
+def test_help_names_the_default_of_what_may_be_left_out(cli, command: list[str], default: str):
+    # The box breaks lines anywhere.
+    told = " ".join(cli(*command, "--help").out.replace("│", " ").split())
+    assert default in told
+
+
 def test_version(cli) -> None:
     assert cli("--version").out == f"firstfix {__version__}\n"
 

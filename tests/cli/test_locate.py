@@ -8,6 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from firstfix.cli.answers import as_text
+from firstfix.core.estimate import Evidence, Hypothesis, LocateResult, SearchReport, Verdict
+from firstfix.core.se2 import SE2
+
 Files = tuple[Path, Path]
 
 
@@ -59,6 +63,30 @@ def test_a_place_there_is_twice_ends_with_1_and_lists_both(cli, alike: Files) ->
     told = cli("locate", *alike)
     assert told.status == 1
     assert "| rank |" in told.out
+
+
+@pytest.mark.parametrize(
+    ("probabilities", "rows", "rest"),
+    [
+        ([1.0], 0, 0),
+        ([0.98, 0.02], 2, 0),
+        ([0.9995, 0.0002, 0.0001, 0.0001, 0.0001], 3, 2),
+        ([0.9, 0.09, 0.005, 0.001, 0.0009], 4, 1),
+        ([1 / 24] * 24, 10, 14),
+    ],
+)
+def test_places_that_are_not_likely_at_all_are_not_listed(
+    probabilities: list[float], rows: int, rest: int
+) -> None:
+    evidence = Evidence(explained=1.0, short=0.0, through_wall=0.0, unknown=0.0, beams=60)
+    places = tuple(
+        Hypothesis(SE2(float(i), 0.0, 0.0), np.eye(3), 0.1, p, evidence)
+        for i, p in enumerate(probabilities)
+    )
+    search = SearchReport(poses=10, searched=1.0, proven=True)
+    text = as_text(LocateResult(Verdict.AMBIGUOUS, "why", places, search, 0.01), None)
+    assert max(0, text.count("\n| ") - 2) == rows  # head and rule
+    assert (f"and {rest} less likely ones" in text) == (rest > 0)
 
 
 def test_all_scans_are_a_line_each_and_end_with_0(cli, unique: Files) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -14,7 +15,9 @@ from firstfix.core.se2 import SE2
 from firstfix.evaluation.outcome import PoseError
 from firstfix.evaluation.tables import markdown_table
 
-MOST_ROWS = 10
+# What is listed for a person: places that are likely at all, and some to compare them with.
+LEAST_PROBABILITY = 0.001
+FEWEST_ROWS, MOST_ROWS = 3, 10
 
 
 def truth_at(recording: Recording, index: int) -> SE2 | None:
@@ -81,12 +84,11 @@ def as_text(result: LocateResult, truth: SE2 | None) -> str:
         f"search       {search.poses:,} poses, {search.searched:.0%} decided, {proof}",
         f"time         {result.elapsed_s:.3f} s",
     ]
+    rows = _rows(result)
     if len(result.hypotheses) > 1:
-        lines += ["", _hypothesis_table(result).rstrip()]
-    if len(result.hypotheses) > MOST_ROWS:
-        lines.append(
-            f"and {len(result.hypotheses) - MOST_ROWS} less likely ones (--json lists all)"
-        )
+        lines += ["", _hypothesis_table(result.hypotheses[:rows]).rstrip()]
+    if len(result.hypotheses) > rows:
+        lines.append(f"and {len(result.hypotheses) - rows} less likely ones (--json lists all)")
     return "\n".join(lines)
 
 
@@ -119,7 +121,12 @@ def _evidence_text(hypothesis: Hypothesis) -> str:
     )
 
 
-def _hypothesis_table(result: LocateResult) -> str:
+def _rows(result: LocateResult) -> int:
+    likely = sum(h.probability >= LEAST_PROBABILITY for h in result.hypotheses)
+    return min(MOST_ROWS, max(FEWEST_ROWS, likely))
+
+
+def _hypothesis_table(hypotheses: Sequence[Hypothesis]) -> str:
     head = ["rank", "x m", "y m", "yaw °", "probability", "score", "explained", "through wall"]
     return markdown_table(
         head,
@@ -134,7 +141,7 @@ def _hypothesis_table(result: LocateResult) -> str:
                 f"{h.evidence.explained:.0%}",
                 f"{h.evidence.through_wall:.0%}",
             ]
-            for rank, h in enumerate(result.hypotheses[:MOST_ROWS], 1)
+            for rank, h in enumerate(hypotheses, 1)
         ],
     )
 

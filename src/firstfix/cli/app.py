@@ -28,6 +28,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",  # paragraphs flow, and what stands in brackets stays
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command()(locate)

@@ -25,7 +25,7 @@ def locate(
         Path, typer.Argument(metavar="SCANS", help=".npz, ROS 1 or ROS 2 bag, or CARMEN log.")
     ],
     index: Annotated[
-        int | None, typer.Option("--index", min=0, help="Which scan, from 0. [default: 0]")
+        int | None, typer.Option("--index", min=0, help="Which scan, from 0.", show_default="0")
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Locate every scan.")] = False,
     method: Annotated[Method, typer.Option(help="How the map is searched.")] = Method.FAST,

@@ -74,11 +74,13 @@ def show(
     plot: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Where the picture goes. [default: firstfix-NAME.png here]"
+            metavar="FILE",
+            help="Where the picture goes.",
+            show_default="firstfix-NAME.png here",
         ),
     ] = None,
     show_alike: Annotated[
-        bool, typer.Option("--alike", help="Mark which places look alike, as `map check` does.")
+        bool, typer.Option("--alike", help="Mark which places look alike, as 'map check' does.")
     ] = False,
     samples: alike.Samples = None,
     beams: alike.Beams = 360,
