@@ -59,8 +59,8 @@ class MapFields:
     ranges: NDArray[np.uint8]
 
     @cached_property
-    def layouts(self) -> dict[tuple[int, int], PhasedField]:
-        """The last layout of ``pointscore``, by its stride and margin: dear to make, kept."""
+    def layouts(self) -> dict[int, PhasedField]:
+        """The widest layout of ``pointscore`` made so far, by its stride."""
         return {}
 
     @cached_property

@@ -154,18 +154,17 @@ def pose_scores(
 
 
 def _pointscore_field(fields: MapFields, stride: int, longest_cells: float) -> PhasedField:
-    # Doubling margins: scans of one sensor, longest beams a little different, share one layout.
-    margin = 64
-    while margin * stride <= longest_cells + stride:
-        margin *= 2
-    key = (stride, margin)
-    if key not in fields.layouts:
-        fields.layouts.clear()
+    # A layout is dear to make: the scans of a sensor share the one that its longest beam asked for.
+    kept = fields.layouts.get(stride)
+    if kept is None or kept.margin * stride <= longest_cells + stride:
+        margin = 64
+        while margin * stride <= longest_cells + stride:
+            margin *= 2
         around = _continued(fields.pointscore, margin * stride)
         if around.max() > _SUMMED_NARROW:
             around = around.astype(np.uint32)
-        fields.layouts[key] = lay_out(around, 1, stride, margin)
-    return fields.layouts[key]
+        kept = fields.layouts[stride] = lay_out(around, 1, stride, margin)
+    return kept
 
 
 def _continued(pointscore: NDArray[np.uint16], margin: int) -> NDArray[np.uint16]:

@@ -17,6 +17,9 @@ _EXPONENT = 12.0
 _BEAMS_FOR_EXPONENT = 30
 _FLOOR = 0.2
 
+# An answer with fewer beams explained comes with a warning.
+_DOUBTFUL_FIT = 0.6
+
 # Mean cost at which the best place of a wrong map begins to be as good as the right one.
 _WRONG_MAP_COST = 2.3
 
@@ -76,6 +79,11 @@ def judge(
         )
         return Verdict.NO_MATCH, reason
     rivals = int(np.count_nonzero(probabilities >= 0.1 * probabilities[0]))
-    if rivals == 1:
-        return Verdict.AMBIGUOUS, f"{fit} here, too few to be sure"
-    return Verdict.AMBIGUOUS, f"{rivals} places fit about as well; motion would tell them apart"
+    doubt = "; perhaps the wrong map" if best.explained < _DOUBTFUL_FIT else ""
+    if rivals > 1:
+        reason = f"{rivals} places fit about as well; motion would tell them apart{doubt}"
+    elif nowhere > 1.0 - unique_probability:
+        reason = f"{fit} here, too few to be sure{doubt}"
+    else:
+        reason = f"{fit} here, but others not badly enough to be sure{doubt}"
+    return Verdict.AMBIGUOUS, reason
