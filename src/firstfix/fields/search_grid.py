@@ -8,6 +8,7 @@ its inner loops have a fixed length that compiles to vector instructions without
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -50,6 +51,11 @@ class SearchGrid:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    @cached_property
+    def in_tile(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Row and column of every position in its tile, each of shape (n,)."""
+        return self.rows % np.int32(TILE_ROWS), self.columns % np.int32(TILE_COLUMNS)
 
     @property
     def offset(self) -> float:

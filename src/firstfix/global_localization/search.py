@@ -28,8 +28,8 @@ from firstfix.fields.range_table import DIRECTIONS
 from firstfix.fields.search_grid import TILE_COLUMNS, TILE_ROWS
 from firstfix.global_localization.beams import Beams, by_direction
 
-ENDPOINT_BEAMS = 48
-RANGE_BEAMS = 48
+ENDPOINT_BEAMS = 36
+RANGE_BEAMS = 40
 
 # Sensing through a wall is nearly impossible; a beam cut short by a person is common; a beam that
 # did not return may have met glass or black paint. Counts of range_table.UNIT_M: 1 m, 0.4 m, 0.5 m.
@@ -176,8 +176,7 @@ def _score_tiles(
         tiles,
         positions.tile_starts,
         endpoints.base(positions.tile_rows, positions.tile_columns),
-        positions.rows % TILE_ROWS,
-        positions.columns % TILE_COLUMNS,
+        *positions.in_tile,
         (endpoints.values, endpoints.columns, queries.offsets),
         (fields.ranges, queries.directions, queries.counts, queries.through, queries.short),
         (queries.endpoint_weight, queries.range_weight),
