@@ -38,9 +38,9 @@ class LocateConfig:
     """
 
     budget_s: float = 30.0
-    shortlist: int = 200
+    shortlist: int = 150
     hypotheses: int = 24
-    unique_probability: float = 0.92
+    unique_probability: float = 0.95
 
     def __post_init__(self) -> None:
         for name, least, most in (

@@ -21,7 +21,7 @@ _FLOOR = 0.2
 _DOUBTFUL_FIT = 0.6
 
 # Mean cost at which the best place of a wrong map begins to be as good as the right one.
-_WRONG_MAP_COST = 1.8
+_WRONG_MAP_COST = 2.3
 
 
 def place_probabilities(scores: NDArray[np.float64], beams: int) -> NDArray[np.float64]:
