@@ -25,7 +25,6 @@ from firstfix.fields.clearance import chessboard_clearance
 from firstfix.fields.distance import (
     euclidean_distance,
     manhattan_distance,
-    truncated_distance,
     truncated_squares,
 )
 from firstfix.fields.endpoint_field import build_endpoint_field
@@ -58,7 +57,6 @@ def time_transforms(grid: OccupancyGrid, runs: int) -> None:
     occupied = grid.occupied
     show("manhattan distance", runs, lambda: manhattan_distance(occupied))
     show("euclidean distance", runs, lambda: euclidean_distance(occupied))
-    show("truncated distance, 20 cells", runs, lambda: truncated_distance(occupied, 20))
     show("truncated squares, 20 cells", runs, lambda: truncated_squares(occupied, 20))
     show("truncated squares, 63 cells", runs, lambda: truncated_squares(occupied, 63))
     show("chessboard clearance", runs, lambda: chessboard_clearance(occupied))

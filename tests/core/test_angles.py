@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firstfix.core.angles import FULL_TURN, angle_error, circular_mean, wrap
+from firstfix.core.angles import FULL_TURN, angle_error, wrap
 
 angles = st.floats(-1e4, 1e4, allow_nan=False)
 
@@ -58,13 +58,3 @@ def test_angle_error_across_the_seam_is_small() -> None:
 def test_angle_error_of_arrays() -> None:
     errors = angle_error(np.array([0.0, math.pi]), -0.5)
     np.testing.assert_allclose(errors, [0.5, math.pi - 0.5])
-
-
-@given(angles, st.floats(0.0, 1.0))
-def test_circular_mean_of_a_pair_lies_between(middle: float, spread: float) -> None:
-    mean = circular_mean(np.array([middle - spread, middle + spread]), np.array([2.0, 2.0]))
-    assert angle_error(mean, middle) < 1e-6
-
-
-def test_circular_mean_follows_the_weights() -> None:
-    assert circular_mean(np.array([0.0, 3.0]), np.array([1.0, 0.0])) == 0.0

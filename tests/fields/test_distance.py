@@ -14,12 +14,15 @@ from firstfix.fields.distance import (
     SATURATED,
     euclidean_distance,
     manhattan_distance,
-    truncated_distance,
     truncated_squares,
 )
 
 maps = arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=40))
 maps_with_walls = maps.filter(lambda occupied: bool(occupied.any()))
+
+
+def truncated_distance(occupied, limit):
+    return np.sqrt(truncated_squares(occupied, limit).astype(np.float64)).astype(np.float32)
 
 
 def queue_of_the_paper(occupied: NDArray[np.bool_]) -> NDArray[np.uint16]:

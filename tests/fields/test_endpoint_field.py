@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
 
-from firstfix.fields.distance import MAX_LIMIT, truncated_distance, truncated_squares
+from firstfix.fields.distance import MAX_LIMIT, euclidean_distance, truncated_squares
 from firstfix.fields.endpoint_field import LIMIT, LIMIT_M, UNIT_M, build_endpoint_field
 from firstfix.fields.phased_field import PhasedField
 
@@ -42,8 +42,7 @@ def read_at(field: PhasedField, stride: int, y: float, x: float, block: tuple[in
 @given(maps, strides, resolutions)
 def test_every_cell_is_the_mean_distance_of_what_it_covers(occupied, stride, resolution):
     field = build(occupied, resolution, stride)
-    limit = min(MAX_LIMIT, int(LIMIT_M / resolution) + 2)
-    counts = np.minimum(truncated_distance(occupied, limit) * resolution / UNIT_M, LIMIT)
+    counts = np.minimum(euclidean_distance(occupied) * resolution / UNIT_M, LIMIT)
     side = max(1, stride // 2)
     for y in range(0, occupied.shape[0], side):
         for x in range(0, occupied.shape[1], side):

@@ -56,21 +56,3 @@ def angle_error(
     """
     error = np.abs(wrap(np.asarray(a, np.float64) - np.asarray(b, np.float64)))
     return error if isinstance(a, np.ndarray) or isinstance(b, np.ndarray) else float(error)
-
-
-def circular_mean(angles: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
-    """Weighted mean direction.
-
-    Parameters
-    ----------
-    angles : ndarray, shape (n,)
-        Directions, rad.
-    weights : ndarray, shape (n,)
-        Non-negative weights; they need not sum to one.
-
-    Returns
-    -------
-    float
-        Mean direction, rad, in (-π, π].
-    """
-    return wrap(math.atan2(float(weights @ np.sin(angles)), float(weights @ np.cos(angles))))

@@ -86,7 +86,7 @@ def draw_answer(
         if truth is not None:
             axes.plot(truth.x, truth.y, "k+", ms=14, mew=2, label="truth", zorder=6)
     whole.set_title("places that fit" if best is not None else "no place fits")
-    near.set_title("the scan at the best place" if best is not None else "the map")
+    near.set_title("the beams that hit, at the best place" if best is not None else "the map")
     if near.get_legend_handles_labels()[0]:
         near.legend(loc="upper right", fontsize="small")
     figure.suptitle(f"{result.verdict.value}: {result.reason}", wrap=True)

@@ -79,25 +79,3 @@ def truncated_squares(occupied: NDArray[np.bool_], limit: int) -> NDArray[np.uin
     squares = np.empty(occupied.shape, np.uint16)
     distance_kernels.truncated(np.ascontiguousarray(occupied), limit, squares)
     return squares
-
-
-def truncated_distance(occupied: NDArray[np.bool_], limit: int) -> NDArray[np.float32]:
-    """Measure the Euclidean distance to the nearest wall, at most a limit.
-
-    Equals ``minimum(euclidean_distance(occupied), limit)`` at a fraction of its time
-    (``benchmarks/fields.py``).
-
-    Parameters
-    ----------
-    occupied : ndarray of bool, shape (height, width)
-        Where a wall is.
-    limit : int
-        Largest distance reported, cells, 1 to `MAX_LIMIT`.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width)
-        Distance, cells.
-    """
-    squares = truncated_squares(occupied, limit)
-    return np.sqrt(np.arange(limit * limit + 1)).astype(np.float32)[squares]
