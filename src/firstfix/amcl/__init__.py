@@ -1,0 +1,1 @@
+"""The dynamic stage: adaptive Monte Carlo localization."""

@@ -1,0 +1,177 @@
+"""The places that a belief is about: connected bins, each with its mass, mean and covariance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from firstfix.amcl.bins import EMPTY, HEADINGS, bin_of, key_of, new_table, slot_of
+from firstfix.amcl.particles import Particles
+from firstfix.core.se2 import SE2
+
+# A belief over a whole building falls into hundreds of clusters; the heaviest are described.
+MAX_CLUSTERS = 24
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Cluster:
+    """One place of a belief.
+
+    Parameters
+    ----------
+    mass : float
+        Probability of the place, 0 to 1.
+    pose : SE2
+        Mean of ``T_map_base``, circular in yaw.
+    covariance : ndarray, shape (3, 3)
+        Of x (m), y (m), yaw (rad) in the map frame, about the pose. Made read-only.
+    """
+
+    mass: float
+    pose: SE2
+    covariance: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        self.covariance.flags.writeable = False
+
+
+def find_clusters(particles: Particles, emphasis: NDArray[np.float64]) -> tuple[Cluster, ...]:
+    """Group particles whose bins touch, and describe the heaviest groups.
+
+    Parameters
+    ----------
+    particles : Particles
+        The belief: it gives mass and covariance.
+    emphasis : ndarray, shape (n,)
+        Weights for the mean pose of a group; the particles' own, or sharper ones.
+
+    Returns
+    -------
+    tuple of Cluster
+        1 to 24, heaviest first.
+    """
+    x, y, yaw = particles.x, particles.y, particles.yaw
+    label, count = _label(x, y, yaw)
+    mass, mean, covariance = _moments(x, y, yaw, particles.weight, emphasis, label, count)
+    order = np.argsort(-mass, kind="stable")[:MAX_CLUSTERS].tolist()
+    return tuple(
+        Cluster(float(mass[i]), SE2.from_array(mean[i]), covariance[i].copy())
+        for i in order
+        if mass[i] > 0.0
+    )
+
+
+@njit(cache=True, nogil=True)
+def _label(
+    x: NDArray[np.float64], y: NDArray[np.float64], yaw: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], int]:
+    """Label particles by the connected group of their bin: 26 neighbours, headings all round."""
+    n = x.shape[0]
+    table = new_table(n)
+    bins = np.empty((n, 3), np.int64)
+    bin_index = np.empty(n, np.int64)
+    count = 0
+    for i in range(n):
+        column, row, turn = bin_of(x[i], y[i], yaw[i])
+        key = key_of(column, row, turn)
+        slot = slot_of(table, key)
+        if table[slot, 0] == EMPTY:
+            table[slot, 0], table[slot, 1] = key, count
+            bins[count, 0], bins[count, 1], bins[count, 2] = column, row, turn
+            count += 1
+        bin_index[i] = table[slot, 1]
+    parent = np.arange(count)
+    for b in range(count):
+        for neighbour in range(27):
+            column = bins[b, 0] + neighbour // 9 - 1
+            row = bins[b, 1] + neighbour // 3 % 3 - 1
+            turn = (bins[b, 2] + neighbour % 3 - 1) % HEADINGS
+            slot = slot_of(table, key_of(column, row, turn))
+            if table[slot, 0] != EMPTY:
+                _join(parent, b, table[slot, 1])
+    # Groups are numbered in the order of their first particle.
+    number = np.full(count, -1, np.int64)
+    groups = 0
+    label = np.empty(n, np.int64)
+    for i in range(n):
+        root = _root(parent, bin_index[i])
+        if number[root] < 0:
+            number[root] = groups
+            groups += 1
+        label[i] = number[root]
+    return label, groups
+
+
+@njit(cache=True, nogil=True)
+def _join(parent: NDArray[np.int64], a: int, b: int) -> None:
+    a, b = _root(parent, a), _root(parent, b)
+    parent[max(a, b)] = min(a, b)
+
+
+@njit(cache=True, nogil=True)
+def _root(parent: NDArray[np.int64], i: int) -> int:
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@njit(cache=True, nogil=True)
+def _moments(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    yaw: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    emphasis: NDArray[np.float64],
+    label: NDArray[np.int64],
+    count: int,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Sum up mass, mean pose and covariance of every group.
+
+    Headings are averaged as turns against the first of the group, wrapped: a group is connected and
+    far narrower than a half turn, or means nothing. It saves two thirds of the time.
+    """
+    mass, shares = np.zeros(count), np.zeros(count)
+    first = np.full(count, -1, np.int64)
+    mean = np.zeros((count, 3))
+    for i in range(x.shape[0]):
+        k, w = label[i], emphasis[i]
+        if first[k] < 0:
+            first[k] = i
+        mass[k] += weight[i]
+        shares[k] += w
+        mean[k, 0] += w * (x[i] - x[first[k]])
+        mean[k, 1] += w * (y[i] - y[first[k]])
+        mean[k, 2] += w * _wrapped(yaw[i] - yaw[first[k]])
+    for k in range(count):
+        share = 1.0 / shares[k] if shares[k] > 0.0 else 0.0
+        mean[k, 0] = x[first[k]] + share * mean[k, 0]
+        mean[k, 1] = y[first[k]] + share * mean[k, 1]
+        mean[k, 2] = yaw[first[k]] + share * mean[k, 2]
+    covariance = np.zeros((count, 3, 3))
+    for i in range(x.shape[0]):
+        k, w = label[i], weight[i]
+        dx, dy = x[i] - mean[k, 0], y[i] - mean[k, 1]
+        turn = _wrapped(yaw[i] - mean[k, 2])
+        covariance[k, 0, 0] += w * dx * dx
+        covariance[k, 0, 1] += w * dx * dy
+        covariance[k, 0, 2] += w * dx * turn
+        covariance[k, 1, 1] += w * dy * dy
+        covariance[k, 1, 2] += w * dy * turn
+        covariance[k, 2, 2] += w * turn * turn
+    for k in range(count):
+        if mass[k] > 0.0:
+            for a in range(3):
+                for b in range(a, 3):
+                    covariance[k, a, b] /= mass[k]
+                    covariance[k, b, a] = covariance[k, a, b]
+    return mass, mean, covariance
+
+
+@njit(cache=True, nogil=True)
+def _wrapped(turn: float) -> float:
+    return turn - 2.0 * math.pi * math.ceil(turn / (2.0 * math.pi) - 0.5)

@@ -1,0 +1,145 @@
+"""Settings of the dynamic stage: names, units and defaults of Nav2's AMCL."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+from enum import Enum
+from typing import Any
+
+from firstfix.core.errors import InputError
+from firstfix.core.se2 import SE2
+
+
+class MotionModel(Enum):
+    """How the base moves; the values are Nav2's plugin names."""
+
+    DIFFERENTIAL = "nav2_amcl::DifferentialMotionModel"
+    OMNIDIRECTIONAL = "nav2_amcl::OmniMotionModel"
+    STATIONARY = "stationary"
+
+
+class SensorModel(Enum):
+    """How a scan weighs a particle; the values are Nav2's."""
+
+    LIKELIHOOD_FIELD = "likelihood_field"
+    LIKELIHOOD_FIELD_PROB = "likelihood_field_prob"
+    BEAM = "beam"
+
+
+def _setting(default: Any, text: str, least: float = -math.inf, most: float = math.inf) -> Any:
+    metadata = {"description": text, "least": least, "most": most}
+    return field(default=default, metadata=metadata)
+
+
+@dataclass(frozen=True, slots=True)
+class AmclConfig:
+    """All settings of the filter; the metadata of each field has its description and range.
+
+    Every parameter of Nav2's AMCL is here under its own name. `model_unknown_space` is Beluga's,
+    `selective_resampling` that of AMCL for ROS 1.
+
+    Raises
+    ------
+    InputError
+        If a setting has the wrong type or is out of its range, or two contradict each other.
+    """
+
+    alpha1: float = _setting(0.2, "rotation noise from rotation", 0.0)
+    alpha2: float = _setting(0.2, "rotation noise from translation", 0.0)
+    alpha3: float = _setting(0.2, "translation noise from translation", 0.0)
+    alpha4: float = _setting(0.2, "translation noise from rotation", 0.0)
+    alpha5: float = _setting(0.2, "sideways noise from translation (omnidirectional)", 0.0)
+    robot_model_type: MotionModel = _setting(MotionModel.DIFFERENTIAL, "how the base moves")
+
+    laser_model_type: SensorModel = _setting(
+        SensorModel.LIKELIHOOD_FIELD, "how a scan weighs a particle"
+    )
+    max_beams: int = _setting(60, "beams of a scan used, evenly spaced", 2, 20_000)
+    laser_min_range: float = _setting(-1.0, "shortest range used, m; -1: the sensor's own", -1.0)
+    laser_max_range: float = _setting(100.0, "longest range used, m; -1: the sensor's own", -1.0)
+    laser_likelihood_max_dist: float = _setting(
+        2.0, "distance from a wall beyond which an end point is just wrong, m", 0.01
+    )
+    z_hit: float = _setting(0.5, "weight of a hit in the mixture", 0.0, 1.0)
+    z_short: float = _setting(0.05, "weight of something before the wall (beam)", 0.0, 1.0)
+    z_max: float = _setting(0.05, "weight of no return (beam)", 0.0, 1.0)
+    z_rand: float = _setting(0.5, "weight of anything at all", 1e-6, 1.0)
+    sigma_hit: float = _setting(0.2, "spread of a hit, m", 1e-3)
+    lambda_short: float = _setting(0.1, "decay of the readings before the wall (beam), 1/m", 1e-6)
+    do_beamskip: bool = _setting(
+        False, "leave out beams that most particles do not explain (likelihood_field_prob)"
+    )
+    beam_skip_distance: float = _setting(
+        0.5, "distance from a wall up to which an end point is explained, m", 0.0
+    )
+    beam_skip_threshold: float = _setting(
+        0.3, "share of particles that must explain a beam for it to count", 0.0, 1.0
+    )
+    beam_skip_error_threshold: float = _setting(
+        0.9, "share of beams skipped from which on none is", 0.0, 1.0
+    )
+    model_unknown_space: bool = _setting(
+        False, "an end point in unknown space is neither in a wall nor in the free"
+    )
+
+    min_particles: int = _setting(500, "least number of particles", 1, 10_000_000)
+    max_particles: int = _setting(2000, "greatest number of particles", 1, 10_000_000)
+    pf_err: float = _setting(0.05, "KLD: greatest error of the distribution", 1e-6, 1.0)
+    pf_z: float = _setting(
+        0.99, "KLD: upper standard normal quantile of the probability of a smaller error", 0.0, 10.0
+    )
+    resample_interval: int = _setting(1, "updates from one resampling to the next", 1)
+    selective_resampling: bool = _setting(
+        False, "resample only when the effective sample size is below half of the particles"
+    )
+    recovery_alpha_slow: float = _setting(
+        0.0, "decay of the slow average weight; 0: no new particles (0.001 is a good start)", 0, 1
+    )
+    recovery_alpha_fast: float = _setting(
+        0.0, "decay of the fast average weight; 0: no new particles (0.1 is a good start)", 0, 1
+    )
+    update_min_d: float = _setting(0.25, "translation before an update, m", 0.0)
+    update_min_a: float = _setting(0.2, "rotation before an update, rad", 0.0)
+    random_seed: int = _setting(-1, "seed of all randomness; negative: 0, so that runs repeat", -1)
+
+    set_initial_pose: bool = _setting(False, "start at initial_pose")
+    initial_pose: SE2 = _setting(SE2.identity(), "pose of the base in the map at the start")
+    always_reset_initial_pose: bool = _setting(False, "forget the last pose at every reset")
+    save_pose_rate: float = _setting(0.5, "rate at which the pose is saved, Hz; -1: never", -1.0)
+    transform_tolerance: float = _setting(1.0, "validity of map -> odom into the future, s", 0.0)
+    tf_broadcast: bool = _setting(True, "publish map -> odom")
+    first_map_only: bool = _setting(False, "ignore maps after the first")
+    base_frame_id: str = _setting("base_footprint", "frame of the base")
+    odom_frame_id: str = _setting("odom", "frame of the odometry")
+    global_frame_id: str = _setting("map", "frame of the map")
+    scan_topic: str = _setting("scan", "topic of the scans")
+    map_topic: str = _setting("map", "topic of the map")
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            _check(entry.name, getattr(self, entry.name), entry.default, dict(entry.metadata))
+        if self.min_particles > self.max_particles:
+            raise InputError(
+                expected="min_particles up to max_particles",
+                received=f"{self.min_particles} and {self.max_particles}",
+                remedy="raise max_particles or lower min_particles",
+            )
+
+
+def _check(name: str, value: object, default: object, metadata: dict[str, Any]) -> None:
+    least, most = metadata["least"], metadata["most"]
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    fits = type(value) is type(default) or (isinstance(default, float) and number)
+    if number and fits:
+        assert isinstance(value, (int, float))  # noqa: S101 - said above; for the type checker
+        fits = math.isfinite(value) and least <= value <= most
+    if not fits:
+        kind = "number" if isinstance(default, float) else type(default).__name__
+        limits = "" if not number or least == -math.inf else f" of at least {least:g}"
+        limits += "" if not number or most == math.inf else f" and at most {most:g}"
+        raise InputError(
+            expected=f"{name} ({metadata['description']}) as a {kind}{limits}",
+            received=f"{value!r}",
+            remedy=f"the default is {default}",
+        )

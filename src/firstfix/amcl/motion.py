@@ -1,0 +1,154 @@
+"""How odometry moves the particles, and how far it may be wrong.
+
+Thrun, Burgard & Fox, "Probabilistic Robotics" (2005), table 5.6, and its extension to robots that
+move sideways, with alpha1 to alpha5 as ROS has always read them: times a *squared* motion they give
+a variance.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from firstfix.amcl.config import AmclConfig, MotionModel
+from firstfix.amcl.particles import Particles
+from firstfix.core.angles import angle_error, wrap
+from firstfix.core.se2 import SE2
+
+# Below this a translation has no direction worth believing (as in ROS: a robot turning in place).
+_NO_TRANSLATION_M = 0.01
+
+# The alphas are tuned on increments of about update_min_d and update_min_a. One long increment,
+# where scans are rare, would get many times the noise of the same way in several (the standard
+# deviation grows with the length, not with its root), so longer ones are driven in pieces.
+_PIECE_M = 0.5
+_PIECE_RAD = 0.4
+_MAX_PIECES = 1000
+
+Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+"""Direction (rad), length (m), way to its left (m) and turn (rad) of every particle, shape (n,)."""
+
+
+def propagate(
+    particles: Particles, T_before_after: SE2, config: AmclConfig, rng: np.random.Generator
+) -> Particles:
+    """Move every particle as odometry says, each with an error of its own.
+
+    Parameters
+    ----------
+    particles : Particles
+        The belief before the motion.
+    T_before_after : SE2
+        The increment: pose of the base after the motion in the base frame before it.
+    config : AmclConfig
+        Motion model and its alphas.
+    rng : numpy.random.Generator
+        Source of randomness.
+
+    Returns
+    -------
+    Particles
+        The belief after it, with the weights of before.
+    """
+    if config.robot_model_type is MotionModel.STATIONARY:
+        return particles
+    count, T_piece = pieces(T_before_after, config)
+    x, y, yaw = particles.x, particles.y, particles.yaw
+    for _ in range(count):
+        if config.robot_model_type is MotionModel.OMNIDIRECTIONAL:
+            motion = _omnidirectional(T_piece, config, len(particles), rng)
+        else:
+            motion = _differential(T_piece, config, len(particles), rng)
+        x, y, yaw = _drive(x, y, yaw, *motion)
+    return Particles(x, y, yaw, particles.weight)
+
+
+def pieces(T_before_after: SE2, config: AmclConfig) -> tuple[int, SE2]:
+    """Cut an increment into equal parts of an arc, none much longer than the alphas are meant for.
+
+    Parameters
+    ----------
+    T_before_after : SE2
+        The increment.
+    config : AmclConfig
+        update_min_d and update_min_a.
+
+    Returns
+    -------
+    tuple of int and SE2
+        Number of parts, and the part: so often chained, it is the increment.
+    """
+    length = math.hypot(T_before_after.x, T_before_after.y)
+    turn = T_before_after.yaw
+    longest = max(_PIECE_M, 2.0 * config.update_min_d)
+    widest = max(_PIECE_RAD, 2.0 * config.update_min_a)
+    n = min(_MAX_PIECES, math.ceil(max(length / longest, abs(turn) / widest)))
+    if n <= 1:
+        return 1, T_before_after
+    # A circular arc: its chord spans the direction of travel, half the turn further.
+    direction = math.atan2(T_before_after.y, T_before_after.x) - turn / 2.0
+    shorter = 1.0 / n if abs(turn) < 1e-9 else math.sin(turn / 2 / n) / math.sin(turn / 2)
+    chord, along = length * shorter, direction + turn / 2.0 / n
+    return n, SE2(chord * math.cos(along), chord * math.sin(along), turn / n)
+
+
+def _differential(
+    T_before_after: SE2, config: AmclConfig, n: int, rng: np.random.Generator
+) -> Motion:
+    """Turn, drive, turn; each with noise (table 5.6)."""
+    trans = math.hypot(T_before_after.x, T_before_after.y)
+    rot1 = math.atan2(T_before_after.y, T_before_after.x) if trans >= _NO_TRANSLATION_M else 0.0
+    rot2 = wrap(T_before_after.yaw - rot1)
+    # Backwards is no half turn and back: the noise follows the smaller angle.
+    turn1, turn2 = (min(angle_error(r, 0.0), angle_error(r, math.pi)) for r in (rot1, rot2))
+    sigma1 = math.sqrt(config.alpha1 * turn1**2 + config.alpha2 * trans**2)
+    sigma_trans = math.sqrt(config.alpha3 * trans**2 + config.alpha4 * (turn1**2 + turn2**2))
+    sigma2 = math.sqrt(config.alpha1 * turn2**2 + config.alpha2 * trans**2)
+    noise = rng.standard_normal((3, n), np.float32)
+    first = rot1 + sigma1 * noise[0].astype(np.float64)
+    length = trans + sigma_trans * noise[1].astype(np.float64)
+    second = rot2 + sigma2 * noise[2].astype(np.float64)
+    return first, length, np.zeros(n), first + second
+
+
+def _omnidirectional(
+    T_before_after: SE2, config: AmclConfig, n: int, rng: np.random.Generator
+) -> Motion:
+    """Drive in any direction while turning; noise along, across and in turn."""
+    trans = math.hypot(T_before_after.x, T_before_after.y)
+    turn = T_before_after.yaw
+    sigma_trans = math.sqrt(config.alpha3 * trans**2 + config.alpha1 * turn**2)
+    sigma_turn = math.sqrt(config.alpha4 * turn**2 + config.alpha2 * trans**2)
+    sigma_strafe = math.sqrt(config.alpha1 * turn**2 + config.alpha5 * trans**2)
+    noise = rng.standard_normal((3, n), np.float32)
+    return (
+        np.full(n, math.atan2(T_before_after.y, T_before_after.x)),
+        trans + sigma_trans * noise[0].astype(np.float64),
+        sigma_strafe * noise[1].astype(np.float64),
+        turn + sigma_turn * noise[2].astype(np.float64),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _drive(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    yaw: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    length: NDArray[np.float64],
+    strafe: NDArray[np.float64],
+    turn: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    n = x.shape[0]
+    new_x, new_y, new_yaw = np.empty(n), np.empty(n), np.empty(n)
+    for i in range(n):
+        along = yaw[i] + direction[i]
+        c, s = math.cos(along), math.sin(along)
+        new_x[i] = x[i] + c * length[i] - s * strafe[i]
+        new_y[i] = y[i] + s * length[i] + c * strafe[i]
+        turned = yaw[i] + turn[i]
+        new_yaw[i] = turned - 2.0 * math.pi * math.ceil(turned / (2.0 * math.pi) - 0.5)
+    return new_x, new_y, new_yaw

@@ -1,0 +1,72 @@
+"""What a scan says about the particles."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.amcl.beams import Beams
+from firstfix.amcl.config import AmclConfig, SensorModel
+from firstfix.amcl.likelihood_field import LikelihoodField
+from firstfix.amcl.particles import Particles
+from firstfix.amcl.ray_model import RayModel
+from firstfix.core.grid import OccupancyGrid
+
+# Neighbouring beams see the same walls, the same person, the same fault of the map. Multiplied as
+# if each were a witness of its own, they make a belief far too sure of itself; so all beams of a
+# scan together count as this many (docs/decisions/0010).
+INDEPENDENT_BEAMS = 15
+
+
+class Sensor(Protocol):
+    """A sensor model with its map."""
+
+    def log_likelihood(self, particles: Particles, beams: Beams) -> tuple[NDArray[np.float64], int]:
+        """Return the log-likelihood of a scan at each particle, and of how many beams."""
+
+
+def build_sensor(grid: OccupancyGrid, config: AmclConfig) -> Sensor:
+    """Prepare a map for the sensor model of the configuration.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+    config : AmclConfig
+        laser_model_type and the parameters of the model.
+
+    Returns
+    -------
+    Sensor
+        The model, ready to judge.
+    """
+    if config.laser_model_type is SensorModel.BEAM:
+        return RayModel(grid, config)
+    return LikelihoodField(grid, config)
+
+
+def weigh(particles: Particles, beams: Beams, sensor: Sensor) -> tuple[NDArray[np.float64], float]:
+    """Judge every particle by a scan.
+
+    Parameters
+    ----------
+    particles : Particles
+        The belief, n particles.
+    beams : Beams
+        The scan.
+    sensor : Sensor
+        The sensor model.
+
+    Returns
+    -------
+    tuple of ndarray, shape (n,), and float
+        Likelihood of the scan at each particle, 1 at the best; and how well the belief explains the
+        scan: geometric mean of the likelihoods of its beams, 1/m, NaN if no beam took part.
+    """
+    logs, used = sensor.log_likelihood(particles, beams)
+    fit = math.exp(float(particles.weight @ logs) / used) if used else math.nan
+    share = min(1.0, INDEPENDENT_BEAMS / beams.chosen)
+    return np.exp(share * (logs - logs.max())), fit
