@@ -15,7 +15,8 @@ import yaml
 from firstfix.core.errors import MapError
 from firstfix.core.se2 import SE2
 from firstfix.formats.map_files import find_image, find_yaml, show
-from firstfix.formats.map_nodes import kind, read_nodes
+from firstfix.formats.map_nodes import read_nodes
+from firstfix.formats.safe_yaml import kind, to_flag, to_number
 
 # Every key of the format with a line that would be right.
 EXAMPLES = {
@@ -31,9 +32,7 @@ EXAMPLES = {
 # Beyond these a length is in the wrong unit, and its square may leave the floats.
 MIN_RESOLUTION, MAX_RESOLUTION = 1e-4, 1e3
 
-_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _INTEGER = re.compile(r"[-+]?[0-9]+")
-_TRUE, _FALSE = ("true", "yes", "on", "y"), ("false", "no", "off", "n")
 
 
 class MapMode(Enum):
@@ -168,8 +167,7 @@ class _Keys:
         return self._to_number(key, self.text(key))
 
     def _to_number(self, key: str, text: str) -> float:
-        # PyYAML takes 1e-3 for a word and Python 1_0 for a number; the servers do neither.
-        number = float(text) if _NUMBER.fullmatch(text) else math.nan
+        number = to_number(text)
         if not math.isfinite(number):
             raise self.wrong(key, f"a finite number for {key}", show(text))
         return number
@@ -190,12 +188,13 @@ class _Keys:
         return SE2(*(self._to_number(key, text.strip()) for text in texts))
 
     def flag(self, key: str) -> bool:
-        text = self.text(key).lower()
+        text = self.text(key)
         if _INTEGER.fullmatch(text):
             return text.strip("+-0") != ""
-        if text not in _TRUE + _FALSE:
+        flag = to_flag(text)
+        if flag is None:
             raise self.wrong(key, f"0, 1, true or false for {key}", show(text))
-        return text in _TRUE
+        return flag
 
     def mode(self) -> MapMode:
         if "mode" not in self.nodes:
