@@ -42,8 +42,9 @@ def key_of(x: int, y: int, turn: int) -> int:
 def slot_of(table: NDArray[np.int64], key: int) -> int:
     """Return the row of the table that holds a key, or the empty one where it belongs."""
     last = table.shape[0] - 1
-    # Fibonacci hashing: neighbouring bins differ in a few bits, and get rows far apart.
-    slot: int = ((key * 0x9E3779B97F4A7C1) >> 20) & last
+    # Fibonacci hashing: neighbouring bins differ in a few bits, and get rows far apart. The bits
+    # from 32 on depend on all of the key, column included; lower ones only on what is below them.
+    slot: int = ((key * 0x9E3779B97F4A7C1) >> 32) & last
     while table[slot, 0] != EMPTY and table[slot, 0] != key:
         slot = (slot + 1) & last
     return slot
