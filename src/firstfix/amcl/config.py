@@ -27,6 +27,10 @@ class SensorModel(Enum):
     BEAM = "beam"
 
 
+# Beyond this a whole number has no float of its own, and no setting has a meaning.
+_WHOLE_LIMIT = 2.0**53
+
+
 def _setting(default: Any, text: str, least: float = -math.inf, most: float = math.inf) -> Any:
     metadata = {"description": text, "least": least, "most": most}
     return field(default=default, metadata=metadata)
@@ -36,7 +40,7 @@ def _setting(default: Any, text: str, least: float = -math.inf, most: float = ma
 class AmclConfig:
     """All settings of the filter; the metadata of each field has its description and range.
 
-    Every parameter of Nav2's AMCL is here under its own name. `model_unknown_space` is Beluga's,
+    The parameters of Nav2's AMCL are here under their own names. `model_unknown_space` is Beluga's,
     `selective_resampling` that of AMCL for ROS 1.
 
     Raises
@@ -118,7 +122,10 @@ class AmclConfig:
 
     def __post_init__(self) -> None:
         for entry in fields(self):
-            _check(entry.name, getattr(self, entry.name), entry.default, dict(entry.metadata))
+            value = _checked(
+                entry.name, getattr(self, entry.name), entry.default, dict(entry.metadata)
+            )
+            object.__setattr__(self, entry.name, value)
         if self.min_particles > self.max_particles:
             raise InputError(
                 expected="min_particles up to max_particles",
@@ -127,19 +134,27 @@ class AmclConfig:
             )
 
 
-def _check(name: str, value: object, default: object, metadata: dict[str, Any]) -> None:
+def _checked(name: str, value: object, default: object, metadata: dict[str, Any]) -> object:
+    """Return a setting in the type of its default; raise InputError if it does not fit."""
     least, most = metadata["least"], metadata["most"]
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    fits = type(value) is type(default) or (isinstance(default, float) and number)
-    if number and fits:
-        assert isinstance(value, (int, float))  # noqa: S101 - said above; for the type checker
-        fits = math.isfinite(value) and least <= value <= most
-    if not fits:
-        kind = "number" if isinstance(default, float) else type(default).__name__
-        limits = "" if not number or least == -math.inf else f" of at least {least:g}"
-        limits += "" if not number or most == math.inf else f" and at most {most:g}"
-        raise InputError(
-            expected=f"{name} ({metadata['description']}) as a {kind}{limits}",
-            received=f"{value!r}",
-            remedy=f"the default is {default}",
-        )
+    if isinstance(default, float) and type(value) is int and abs(value) < _WHOLE_LIMIT:
+        value = float(value)
+    fits = type(value) is type(default) and value != ""
+    if fits and isinstance(value, (int, float)):
+        fits = bool(least <= value <= min(most, _WHOLE_LIMIT))  # not for NaN, not for infinity
+    if fits:
+        return value
+    limits = "" if least == -math.inf else f" of at least {least:g}"
+    limits += "" if most == math.inf else f" and at most {most:g}"
+    raise InputError(
+        expected=f"{name} ({metadata['description']}) as {_kind(default)}{limits}",
+        received=f"{value!r:.60}",
+        remedy=f"the default is {default.value if isinstance(default, Enum) else default}",
+    )
+
+
+def _kind(default: object) -> str:
+    if isinstance(default, Enum):
+        return "one of " + ", ".join(str(choice.value) for choice in type(default))
+    names = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
+    return names.get(type(default), "a pose")
