@@ -18,7 +18,8 @@ from firstfix.amcl.particles import Particles
 from firstfix.core.angles import angle_error, wrap
 from firstfix.core.se2 import SE2
 
-# Below this a translation has no direction worth believing (as in ROS: a robot turning in place).
+# Below this a translation has no direction worth believing: its errors are those of a robot turning
+# in place (as in ROS).
 _NO_TRANSLATION_M = 0.01
 
 # The alphas are tuned on increments of about update_min_d and update_min_a. One long increment,
@@ -100,10 +101,11 @@ def _differential(
 ) -> Motion:
     """Turn, drive, turn; each with noise (table 5.6)."""
     trans = math.hypot(T_before_after.x, T_before_after.y)
-    rot1 = math.atan2(T_before_after.y, T_before_after.x) if trans >= _NO_TRANSLATION_M else 0.0
+    rot1 = math.atan2(T_before_after.y, T_before_after.x)
     rot2 = wrap(T_before_after.yaw - rot1)
+    turns = (rot1, rot2) if trans >= _NO_TRANSLATION_M else (0.0, T_before_after.yaw)
     # Backwards is no half turn and back: the noise follows the smaller angle.
-    turn1, turn2 = (min(angle_error(r, 0.0), angle_error(r, math.pi)) for r in (rot1, rot2))
+    turn1, turn2 = (min(angle_error(r, 0.0), angle_error(r, math.pi)) for r in turns)
     sigma1 = math.sqrt(config.alpha1 * turn1**2 + config.alpha2 * trans**2)
     sigma_trans = math.sqrt(config.alpha3 * trans**2 + config.alpha4 * (turn1**2 + turn2**2))
     sigma2 = math.sqrt(config.alpha1 * turn2**2 + config.alpha2 * trans**2)
@@ -150,5 +152,7 @@ def _drive(
         new_x[i] = x[i] + c * length[i] - s * strafe[i]
         new_y[i] = y[i] + s * length[i] + c * strafe[i]
         turned = yaw[i] + turn[i]
-        new_yaw[i] = turned - 2.0 * math.pi * math.ceil(turned / (2.0 * math.pi) - 0.5)
+        wrapped = turned - 2.0 * math.pi * math.ceil(turned / (2.0 * math.pi) - 0.5)
+        # Rounding may leave it beyond either end by a last bit.
+        new_yaw[i] = wrapped if -math.pi < wrapped <= math.pi else math.pi
     return new_x, new_y, new_yaw
