@@ -76,13 +76,15 @@ class LikelihoodField:
 
     def _table(self, range_max: float) -> NDArray[np.int32]:
         """Return the logarithm for each cell, flat, in integer units; kept for the next scan."""
-        if self._values[0] != range_max:
+        # Looked at once: another thread may put the table of its own sensor there meanwhile.
+        kept = self._values
+        if kept[0] != range_max:
             by_square = likelihoods(self.limit, self.grid.resolution, range_max, self.config)
             logs = np.log(np.maximum(by_square, _LEAST_LIKELIHOOD)) / _UNIT
             table = np.rint(logs).astype(np.int32)[self.squares].ravel()
             table.flags.writeable = False
-            self._values = (range_max, table)
-        return self._values[1]
+            kept = self._values = (range_max, table)
+        return kept[1]
 
     def _unskipped(self, poses: Poses, hits: NDArray[np.float64]) -> NDArray[np.float64]:
         """Leave out the beams that too few particles explain; keep all if too many would go."""
