@@ -110,7 +110,16 @@ def test_a_wrong_type_or_no_number_is_an_error(name, wrong):
 
 
 def test_a_whole_number_is_a_number():
-    assert AmclConfig(update_min_d=1).update_min_d == 1
+    far = AmclConfig(update_min_d=1).update_min_d
+    assert (far, type(far)) == (1.0, float)
+    for enormous in (10**400, 2.0**60):
+        with pytest.raises(InputError, match="update_min_d"):
+            AmclConfig(update_min_d=enormous)
+
+
+def test_a_name_is_not_empty():
+    with pytest.raises(InputError, match="odom_frame_id"):
+        AmclConfig(odom_frame_id="")
 
 
 def test_an_enum_is_not_its_text():
