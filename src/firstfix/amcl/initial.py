@@ -67,6 +67,13 @@ def around_hypotheses(
     InputError
         If there is no hypothesis of positive probability.
     """
+    return equal_weights(hypothesis_poses(hypotheses, n, rng))
+
+
+def hypothesis_poses(
+    hypotheses: Sequence[Hypothesis], n: int, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Draw poses around several places; x (m), y (m), yaw (rad), shape (n, 3), as above."""
     probability = np.array([hypothesis.probability for hypothesis in hypotheses])
     if not probability.sum() > 0.0:
         raise InputError(
@@ -77,13 +84,11 @@ def around_hypotheses(
     # Rounding the cumulative sum spends exactly n and keeps every place within one of its share.
     edges = np.rint(np.append(0.0, np.cumsum(probability) / probability.sum()) * n)
     counts = np.diff(edges).astype(np.int64).tolist()
-    return equal_weights(
-        np.concatenate(
-            [
-                _normal_poses(place.pose, place.covariance, count, rng)
-                for place, count in zip(hypotheses, counts, strict=True)
-            ]
-        )
+    return np.concatenate(
+        [
+            _normal_poses(place.pose, place.covariance, count, rng)
+            for place, count in zip(hypotheses, counts, strict=True)
+        ]
     )
 
 

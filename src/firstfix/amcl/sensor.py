@@ -67,6 +67,8 @@ def weigh(particles: Particles, beams: Beams, sensor: Sensor) -> tuple[NDArray[n
         scan: geometric mean of the likelihoods of its beams, 1/m, NaN if no beam took part.
     """
     logs, used = sensor.log_likelihood(particles, beams)
-    fit = math.exp(float(particles.weight @ logs) / used) if used else math.nan
+    # No `@`: its order of summation, and so its rounding, may depend on the number of threads.
+    mean = float((particles.weight * logs).sum())
+    fit = math.exp(mean / used) if used else math.nan
     share = min(1.0, INDEPENDENT_BEAMS / beams.chosen)
     return np.exp(share * (logs - logs.max())), fit
