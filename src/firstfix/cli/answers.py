@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from firstfix.core.estimate import Hypothesis, LocateResult
-from firstfix.core.recording import Recording
 from firstfix.core.se2 import SE2
 from firstfix.evaluation.outcome import PoseError
 from firstfix.evaluation.tables import markdown_table
@@ -18,13 +17,6 @@ from firstfix.evaluation.tables import markdown_table
 # What is listed for a person: places that are likely at all, and some to compare them with.
 LEAST_PROBABILITY = 0.001
 FEWEST_ROWS, MOST_ROWS = 3, 10
-
-
-def truth_at(recording: Recording, index: int) -> SE2 | None:
-    """Return ``T_map_base`` at a scan; None where the log does not know it."""
-    if recording.truth is None or not np.isfinite(recording.truth[index]).all():
-        return None
-    return SE2.from_array(recording.truth[index])
 
 
 def as_json(index: int, result: LocateResult, truth: SE2 | None) -> dict[str, Any]:

@@ -42,8 +42,9 @@ def locate(
     One scan (not --all) ends with exit status 0 if its place is UNIQUE and 1 if it is not.
     """
     _check_options(index, every, plot)
-    from firstfix.cli.answers import as_json, as_text, truth_at
+    from firstfix.cli.answers import as_json, as_text
     from firstfix.core.estimate import Verdict
+    from firstfix.evaluation.case import truth_at
     from firstfix.formats.map_server import load_map
     from firstfix.formats.recording import load_recording
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.recording import Recording
+from firstfix.core.se2 import SE2
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +74,13 @@ def known_truth(case: Case, recording: Recording) -> NDArray[np.float64]:
             remedy="add `true_pose` to its scans.npz, or leave the case out",
         )
     return recording.truth
+
+
+def truth_at(recording: Recording, index: int) -> SE2 | None:
+    """Return ``T_map_base`` at a scan; None where the log does not know it."""
+    if recording.truth is None or not np.isfinite(recording.truth[index]).all():
+        return None
+    return SE2.from_array(recording.truth[index])
 
 
 def evenly_spaced(indices: NDArray[np.intp], limit: int) -> NDArray[np.intp]:
