@@ -9,8 +9,10 @@ import pytest
 
 from firstfix.cli.app import run
 from firstfix.core.grid import OccupancyGrid
+from firstfix.core.recording import Recording
 from firstfix.core.se2 import SE2
 from firstfix.formats.map_server import save_map
+from firstfix.formats.npz_writer import save_npz
 from firstfix.sim.drawing import Drawing
 from firstfix.sim.lidar import Lidar
 from firstfix.sim.world import identical_rooms
@@ -85,3 +87,15 @@ def unique(cases: Path) -> tuple[Path, Path]:
 def alike(cases: Path) -> tuple[Path, Path]:
     """Map and scans of a place that there is twice."""
     return cases / "alike" / "map.yaml", cases / "alike" / "scans.npz"
+
+
+@pytest.fixture(scope="session")
+def drive(
+    tmp_path_factory: pytest.TempPathFactory, hall_plan: OccupancyGrid, driven: Recording
+) -> Path:
+    """A case with odometry: a drive through the hall."""
+    folder = tmp_path_factory.mktemp("drives") / "drive"
+    folder.mkdir()
+    save_map(hall_plan, folder / "map.yaml")
+    save_npz(driven, folder / "scans.npz")
+    return folder

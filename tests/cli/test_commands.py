@@ -14,7 +14,7 @@ Files = tuple[Path, Path]
 def test_help_names_every_command(cli) -> None:
     ended = cli("--help")
     assert ended.status == 0
-    for command in ("locate", "bench", "map", "demo", "doctor"):
+    for command in ("locate", "track", "bench", "map", "demo", "doctor"):
         assert command in ended.out
         assert cli(command, "--help").status == 0
 

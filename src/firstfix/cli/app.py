@@ -19,6 +19,7 @@ from firstfix.cli.demo import demo
 from firstfix.cli.doctor import doctor
 from firstfix.cli.locate import locate
 from firstfix.cli.map import map_app
+from firstfix.cli.track import track
 from firstfix.core.errors import FirstfixError
 
 WRONG_INPUT = 2
@@ -33,6 +34,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command()(locate)
+app.command()(track)
 app.command()(bench)
 app.add_typer(map_app, name="map")
 app.command()(demo)

@@ -1,0 +1,71 @@
+"""Where results go: refused before the work, not after it, where they could not be written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from firstfix.core.errors import InputError
+
+
+def check_file(path: Path) -> None:
+    """Refuse a file that could not be written; make its folder where it is missing.
+
+    What an existing file holds stays until there is something new.
+
+    Raises
+    ------
+    InputError
+        If it could not be written.
+    """
+    with _writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        is_new = not path.exists()
+        path.open("a").close()
+        if is_new:
+            path.unlink()
+
+
+def check_folder(path: Path) -> None:
+    """Make a folder for results, or refuse it as `check_file` does."""
+    with _writing(path):
+        path.mkdir(parents=True, exist_ok=True)
+
+
+def check_picture(path: Path) -> None:
+    """Refuse a picture that could not be drawn, or not be written under this name."""
+    from firstfix.evaluation.figure import check_path
+
+    check_path(path)
+    check_plots()
+
+
+def check_plots() -> None:
+    """Say now, not after the work, that matplotlib is missing."""
+    from firstfix.evaluation.figure import new_figure
+
+    new_figure(1.0, 1.0)
+
+
+def write_json(document: dict[str, Any], path: Path) -> None:
+    """Write a document, all or nothing."""
+    with _writing(path):
+        text = json.dumps(document, indent=2, allow_nan=False)
+        draft = path.with_name(f".{path.name}.draft")
+        draft.write_text(text + "\n", encoding="utf-8")
+        draft.replace(path)
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            expected="a place where results can be written",
+            received=f"{path} ({error.strerror})",
+            remedy="choose another one",
+        ) from None

@@ -1,0 +1,134 @@
+"""``firstfix track``: where the robot was at every scan of a drive."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from firstfix.cli.progress import progress, working
+from firstfix.cli.settings import load_config, seed_of
+from firstfix.cli.start import WAYS, choose_start, map_key, read_start
+from firstfix.cli.targets import check_file, check_picture
+
+
+def track(
+    map_path: Annotated[Path, typer.Argument(metavar="MAP", help="YAML of a map_server map.")],
+    log: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOG", help=".npz, ROS 1 or ROS 2 bag, or CARMEN log, with odometry."
+        ),
+    ],
+    start: Annotated[
+        str | None,
+        typer.Option(
+            metavar="START",
+            help=f"Pose of the base in the map at the first scan that has odometry: {WAYS}.",
+            show_default="initial_pose of --params where it asks for that, else the truth "
+            "where the log has it",
+        ),
+    ] = None,
+    params: Annotated[
+        Path | None,
+        typer.Option(metavar="YAML", help="Parameters of Nav2's AMCL.", show_default="Nav2's own"),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the pose at every scan, in the TUM format."),
+    ] = None,
+    as_object: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw track and scans on the map: .png, .svg or .pdf."),
+    ] = None,
+    topic: Annotated[
+        str | None, typer.Option(help="Scan topic of a bag, where it has several.")
+    ] = None,
+    keep_pose: Annotated[
+        Path | None,
+        typer.Option(
+            "--save-pose",
+            metavar="FILE",
+            help="Keep the last pose in a file, at save_pose_rate of the log's time and at the "
+            "end, for --start.",
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            min=0, help="Of all randomness.", show_default="random_seed of --params, else 0"
+        ),
+    ] = None,
+) -> None:
+    """Follow the robot through a log, from a known start.
+
+    Where the log knows the truth, the track is compared with it. Poses are those of the base in the
+    map.
+    """
+    said = read_start(start)
+    _check_targets(out, plot, keep_pose)
+    from firstfix.formats.map_server import load_map
+    from firstfix.formats.recording import load_recording
+
+    config = load_config(params)
+    grid = load_map(map_path)
+    recording = load_recording(log, topic=topic)
+
+    # After the reading: input that cannot be used is told before the kernels are loaded.
+    import numpy as np
+
+    from firstfix.cli.track_answers import track_json, track_text, track_title, trajectory_of
+    from firstfix.evaluation.drive import known_odometry, plan_drive
+    from firstfix.evaluation.track import check_start, follow_drive, make_tracker
+    from firstfix.evaluation.track_metrics import summarize_track
+
+    known_odometry(recording)  # without it, no start would help
+    begin = choose_start(said, grid, recording, config)
+    drive = plan_drive(recording, begin.T_map_base)
+    check_start(grid, drive.begin_at)
+    for note in (*recording.notes, begin.note, *drive.notes):
+        typer.echo(f"note: {note}", err=True)
+
+    with working("preparing the map"):
+        tracker = make_tracker(grid, config)
+        keeper = None
+        if keep_pose is not None:
+            from firstfix.cli.pose_keeper import PoseKeeper
+
+            keeper = PoseKeeper(keep_pose, map_key(grid), config.save_pose_rate)
+    rng = np.random.default_rng(seed_of(config, seed))
+    tracked = []
+    with progress(len(drive.sights), "tracking") as done:
+        for scan in follow_drive(drive, tracker, config, begin.covariance, rng):
+            tracked.append(scan)
+            if keeper is not None:
+                keeper.offer(scan)
+            done(f"{scan.particles} particles")
+    figures = summarize_track(tracked)
+    if keeper is not None:
+        keeper.save(tracked[-1])
+    if out is not None:
+        from firstfix.formats.tum import save_tum
+
+        save_tum(out, trajectory_of(tracked))
+    if plot is not None:
+        from firstfix.evaluation.track_picture import draw_track
+
+        typer.echo(f"picture: {draw_track(grid, tracked, plot, track_title(figures))}", err=True)
+    if as_object:
+        document = track_json(begin, drive, tracked, figures)
+        typer.echo(json.dumps(document, allow_nan=False))
+    else:
+        typer.echo(track_text(tracked, figures))
+
+
+def _check_targets(out: Path | None, plot: Path | None, keep_pose: Path | None) -> None:
+    if plot is not None:
+        check_picture(plot)
+        check_file(plot)
+    for path in (out, keep_pose):
+        if path is not None:
+            check_file(path)
