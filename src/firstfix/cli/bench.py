@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from firstfix.cli.bench_track import PANEL, Params, Seed, bench_track
 from firstfix.cli.progress import progress
+from firstfix.cli.targets import check_file, check_folder, check_plots, write_json
 from firstfix.core.errors import InputError
 from firstfix.global_localization.config import Method
 
@@ -45,6 +44,16 @@ def bench(
     limit: Annotated[
         int, typer.Option(min=0, help="Scans of a case, evenly spaced; 0 tries all.")
     ] = 0,
+    tracked: Annotated[
+        bool,
+        typer.Option(
+            "--track",
+            help="Follow each case with odometry from its true start instead.",
+            rich_help_panel=PANEL,
+        ),
+    ] = False,
+    params: Params = None,
+    seed: Seed = None,
 ) -> None:
     """Locate every scan of every case and compare with the truth.
 
@@ -52,6 +61,16 @@ def bench(
     process that does nothing else. The totals 'total' and 'foreign' of the JSON are those of
     the first --method; 'totals' has one for each.
     """
+    if tracked:
+        _check_tracking(method, report, foreign, limit)
+        bench_track(cases, json_file, jobs, params, seed)
+        return
+    if params is not None or seed is not None:
+        raise InputError(
+            expected="--params and --seed with --track",
+            received="one of them without it",
+            remedy="add --track, or leave them out: locating has no chance in it",
+        )
     from firstfix.cli.cases import find_cases
     from firstfix.evaluation import bench as runner
     from firstfix.evaluation.document import bench_document
@@ -75,11 +94,7 @@ def bench(
         if not others:
             typer.echo("note: no two cases have different sites; nothing foreign tried", err=True)
     if json_file is not None:
-        with _writing(json_file):
-            text = json.dumps(document, indent=2, allow_nan=False)
-            draft = json_file.with_name(f".{json_file.name}.draft")
-            draft.write_text(text + "\n", encoding="utf-8")
-            draft.replace(json_file)
+        write_json(document, json_file)
     if report is not None:
         from firstfix.evaluation.report import write_report
 
@@ -93,27 +108,20 @@ def _told(run: CaseRun | ForeignRun) -> str:
 def _check_targets(json_file: Path | None, report: Path | None) -> None:
     """Refuse before hours of work what could not be written after them."""
     if json_file is not None:
-        with _writing(json_file):
-            json_file.parent.mkdir(parents=True, exist_ok=True)
-            is_new = not json_file.exists()
-            json_file.open("a").close()  # earlier figures stay until there are new ones
-            if is_new:
-                json_file.unlink()
+        check_file(json_file)
     if report is not None:
-        from firstfix.evaluation.figure import new_figure
-
-        new_figure(1.0, 1.0)
-        with _writing(report):
-            report.mkdir(parents=True, exist_ok=True)
+        check_plots()
+        check_folder(report)
 
 
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
+def _check_tracking(
+    method: list[Method] | None, report: Path | None, foreign: bool, limit: int
+) -> None:
+    options = (("--method", method), ("--report", report), ("--foreign", foreign))
+    wrong = [name for name, value in (*options, ("--limit", limit)) if value]
+    if wrong:
         raise InputError(
-            expected="a place where results can be written",
-            received=f"{path} ({error.strerror})",
-            remedy="choose another place for --json or --report",
-        ) from None
+            expected="--track with --json, --jobs, --params and --seed only",
+            received=f"--track with {', '.join(wrong)}",
+            remedy="leave it out: the other options are about locating",
+        )

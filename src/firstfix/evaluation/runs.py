@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firstfix.core.angles import FULL_TURN
 from firstfix.core.estimate import Verdict
-from firstfix.core.grid import FREE, OCCUPIED, OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.evaluation.apart import peak_rss_mb
 from firstfix.evaluation.case import Case, evenly_spaced, known_truth
 from firstfix.evaluation.outcome import Outcome, judge
-from firstfix.fields.raycast import expected_ranges
+from firstfix.evaluation.small_room import scan_of, small_room
 from firstfix.global_localization.config import Method
 from firstfix.global_localization.locate import Locator
 
@@ -151,12 +149,6 @@ def _try(locator: Locator, scan: LaserScan, truth: SE2, index: int) -> Outcome:
 
 def _compile_kernels(method: Method) -> None:
     """Locate in a small room, so that no figure contains the compiler."""
-    cells = np.full((120, 160), FREE, np.int8)
-    cells[[0, -1], :] = cells[:, [0, -1]] = OCCUPIED
-    cells[30:50, 100:120] = OCCUPIED
-    grid = OccupancyGrid(cells, 0.05)
-    bearings = np.linspace(-FULL_TURN / 2, FULL_TURN / 2, 180, endpoint=False)
-    ranges = expected_ranges(grid, SE2(3.0, 2.5, 0.4), bearings, 5.0).astype(np.float32)
-    step = float(bearings[1] - bearings[0])
-    scan = LaserScan(ranges, float(bearings[0]), step, range_min=0.1, range_max=5.0)
+    grid = small_room()
+    scan = scan_of(grid, SE2(3.0, 2.5, 0.4))
     Locator(grid, method=method, cache_dir=None).locate(scan)

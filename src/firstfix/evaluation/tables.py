@@ -41,11 +41,7 @@ def bench_table(document: Row) -> str:
         Markdown; the numbers are aligned in plain text too.
     """
     rows = [*document["cases"], *document["totals"]]
-    cells = [
-        [row["name"], row["method"], *(_cell(row[key], form) for _, key, form in COLUMNS)]
-        for row in rows
-    ]
-    return markdown_table(["case", "method", *(title for title, _, _ in COLUMNS)], cells)
+    return columns_table(rows, {"case": "name", "method": "method"}, COLUMNS)
 
 
 def foreign_table(document: Row) -> str:
@@ -55,6 +51,35 @@ def foreign_table(document: Row) -> str:
         for f in document["foreign_cases"]
     ]
     return markdown_table(["scans of", "on the map of", "method", "n", "unique (all wrong)"], cells)
+
+
+def columns_table(
+    rows: Sequence[Row], words: Mapping[str, str], columns: Sequence[tuple[str, str, str]]
+) -> str:
+    """Lay out rows of figures.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Figures by key; None is shown as a dash.
+    words : mapping
+        Title to key of the columns of words, which come first.
+    columns : sequence of tuple
+        Title, key and format of each column of figures.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
+    cells = [
+        [
+            *(row[key] for key in words.values()),
+            *(_cell(row[key], form) for _, key, form in columns),
+        ]
+        for row in rows
+    ]
+    return markdown_table([*words, *(title for title, _, _ in columns)], cells)
 
 
 def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
