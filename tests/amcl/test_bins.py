@@ -9,7 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firstfix.amcl.bins import BIN_M, BIN_RAD, EMPTY, HEADINGS, bin_of, key_of, new_table, slot_of
+from firstfix.amcl.bins import (
+    BIN_M,
+    BIN_RAD,
+    EMPTY,
+    HEADINGS,
+    bin_of,
+    key_of,
+    new_table,
+    slot_of,
+    with_room,
+)
 from firstfix.core.angles import FULL_TURN, angle_error
 
 places = st.floats(-1e4, 1e4)
@@ -68,6 +78,18 @@ def test_the_table_is_a_dictionary(keys):
             twin[k] = len(twin)
         assert table[slot].tolist() == [k, twin[k]]
     assert {k: v for k, v in table.tolist() if k != EMPTY} == twin
+
+
+@settings(deadline=None)
+@given(st.lists(bins, max_size=200, unique=True))
+def test_a_table_that_grows_keeps_its_entries(found):
+    table = new_table(1)
+    for count, key in enumerate(key_of(*b) for b in found):
+        table = with_room(table, count)
+        table[slot_of(table, key)] = key, count
+        assert 2 * (count + 1) <= len(table)
+    entries = {k: v for k, v in table.tolist() if k != EMPTY}
+    assert entries == {key_of(*b): i for i, b in enumerate(found)}
 
 
 @pytest.mark.parametrize("entries", [0, 1, 8, 9, 500, 2000])

@@ -321,7 +321,6 @@ def test_selective_resampling_waits_until_few_particles_carry_the_belief(room, s
     assert (np.ptp(state.particles.weight) > 0.0) == kept
 
 
-@pytest.mark.xfail(reason="only odometry at rest spreads the particles, not the model at rest")
 def test_what_never_moves_does_not_become_sure_by_odometry_that_drifts(room):
     config = fixed(200, robot_model_type=MotionModel.STATIONARY)
     sensor, rng = build_sensor(room, config), np.random.default_rng(0)

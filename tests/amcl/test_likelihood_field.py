@@ -174,21 +174,21 @@ def test_what_else_is_in_the_block_changes_nothing():
     np.testing.assert_array_equal(mixed, np.array(one_by_one)[order])
 
 
-@pytest.mark.parametrize("reach", [1.0, 1.01, 0.99])
-def test_beams_that_just_reach_the_border_are_looked_up_right(reach):
-    """Particles of one block as near to all four borders as their longest beam is long."""
-    cells = np.zeros((20, 20), np.int8)
-    cells[[0, -1]] = cells[:, [0, -1]] = OCCUPIED
-    grid = OccupancyGrid(cells, RESOLUTION)
-    longest = 5.0 * RESOLUTION * reach
-    ranges = np.full(16, longest, np.float32)
-    scan = LaserScan(ranges, 0.013, 2 * math.pi / 16, 0.05, 8.0)
+@pytest.mark.parametrize("reach", [0.99, 1.0, 1.01, 1.3, 1.7])
+@pytest.mark.parametrize("corners", [[0], [1], [2], [3], [0, 1, 2, 3]])
+def test_beams_that_just_reach_the_border_are_looked_up_right(reach, corners):
+    """A row of cells begins where the one below ends: what leaves on one side must not come in."""
+    cells = np.where(np.random.default_rng(10).random((20, 20)) < 0.1, OCCUPIED, 0)
+    grid = OccupancyGrid(cells.astype(np.int8), RESOLUTION)
+    ranges = np.full(60, 5.0 * RESOLUTION * reach, np.float32)
+    scan = LaserScan(ranges, 0.013, 2 * math.pi / 60, 0.05, 8.0)
     centres = np.array([[x, y] for x in (5.003, 14.997) for y in (5.003, 14.997)]) * RESOLUTION
-    particles = equal_weights(np.column_stack([centres, np.zeros(4)]))
-    beams = choose_beams(scan, AmclConfig())
-    logs, _ = LikelihoodField(grid, AmclConfig()).log_likelihood(particles, beams)
-    expected, _ = brute_force(particles, beams, grid, AmclConfig())
-    np.testing.assert_allclose(logs, expected, atol=16 * UNIT)
+    particles = equal_weights(np.column_stack([centres, np.zeros(4)])[corners])
+    config = AmclConfig(laser_likelihood_max_dist=0.6)
+    beams = choose_beams(scan, config)
+    logs, _ = LikelihoodField(grid, config).log_likelihood(particles, beams)
+    expected, _ = brute_force(particles, beams, grid, config)
+    np.testing.assert_allclose(logs, expected, atol=60 * UNIT)
 
 
 PROB = SensorModel.LIKELIHOOD_FIELD_PROB

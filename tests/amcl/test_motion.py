@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from firstfix.amcl.config import AmclConfig, MotionModel
-from firstfix.amcl.motion import _drive, pieces, propagate
+from firstfix.amcl.motion import Motion, _drive, pieces, propagate
 from firstfix.amcl.particles import Particles, equal_weights
 from firstfix.core.angles import angle_error, wrap
 from firstfix.core.se2 import SE2
@@ -133,32 +133,40 @@ def test_increments_as_long_as_the_updates_are_not_cut():
 
 def test_the_twin_of_the_kernel():
     rng = np.random.default_rng(0)
-    x, y, yaw, direction, length, strafe, turn = rng.normal(0.0, 3.0, (7, 500))
+    x, y, yaw = rng.normal(0.0, 3.0, (3, 500))
     yaw = wrap(yaw)
-    new_x, new_y, new_yaw = _drive(x, y, yaw, direction, length, strafe, turn)
-    ahead = np.exp(1j * (yaw + direction))
-    moved = x + 1j * y + ahead * length + 1j * ahead * strafe
+    noise = rng.standard_normal((3, 500), np.float32)
+    motion = Motion(*rng.normal(0.0, 1.0, 7).tolist())
+    new_x, new_y, new_yaw = _drive(x, y, yaw, tuple(motion), noise)
+    n0, n1, n2 = noise.astype(np.float64)
+    ahead = np.exp(1j * (yaw + motion.direction + motion.sigma_direction * n0))
+    length = motion.length + motion.sigma_length * n1
+    moved = x + 1j * y + ahead * (length + 1j * motion.sigma_left * n0)
     np.testing.assert_allclose(new_x + 1j * new_y, moved)
+    turn = motion.turn + motion.sigma_direction * n0 + motion.sigma_turn * n2
     assert angle_error(new_yaw, yaw + turn).max() < 1e-12
 
 
+def turned_by(yaw, turn):
+    zero, still = np.zeros(len(yaw)), np.zeros((3, len(yaw)), np.float32)
+    return _drive(zero, zero, yaw, (0.0, 0.0, turn, 0.0, 0.0, 0.0, 0.0), still)[2]
+
+
 @settings(deadline=None)
-@given(st.lists(st.floats(-math.pi, math.pi) | st.floats(-30.0, 30.0), min_size=1))
-def test_headings_stay_within_half_a_turn(turned):
-    turn = np.array(turned)
-    for start in (0.0, math.pi, 1.0, np.nextafter(-math.pi, 0.0)):
-        zero = np.zeros(len(turn))
-        yaw = _drive(zero, zero, zero + start, zero, zero, zero, turn)[2]
-        assert (yaw > -math.pi).all()
-        assert (yaw <= math.pi).all()
+@given(
+    st.lists(st.floats(-math.pi, math.pi), min_size=1),
+    st.floats(-math.pi, math.pi) | st.floats(-30.0, 30.0),
+)
+def test_headings_stay_within_half_a_turn(headings, turn):
+    yaw = turned_by(np.array(headings), turn)
+    assert ((yaw > -math.pi) & (yaw <= math.pi)).all()
 
 
 def test_at_the_seam_a_heading_stays_within_half_a_turn():
     seam = np.array([-math.pi, np.nextafter(-math.pi, 0.0), np.nextafter(-math.pi, -4.0)])
-    turn = np.concatenate([seam, -seam, 3 * seam, -3 * seam])
-    zero = np.zeros(len(turn))
-    yaw = _drive(zero, zero, zero, zero, zero, zero, turn)[2]
-    assert ((yaw > -math.pi) & (yaw <= math.pi)).all()
+    for turn in (*seam, *-seam, *(3 * seam), *(-3 * seam), 0.0):
+        yaw = turned_by(np.array([0.0, math.pi, *seam[1:2]]), float(turn))
+        assert ((yaw > -math.pi) & (yaw <= math.pi)).all()
 
 
 # Forwards, turning on the spot, an arc to the right: short enough to be driven in one piece.

@@ -11,6 +11,10 @@ from firstfix.amcl.config import AmclConfig
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 
+# The reach of a sensor that names none (range_max infinite) and of a configuration that asks for
+# the sensor's own: a reading's likelihood anywhere is one over the reach.
+_FARTHEST_M = 1000.0
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Beams:
@@ -63,7 +67,7 @@ def choose_beams(scan: LaserScan, config: AmclConfig) -> Beams:
     Beams
         At most max_beams of the scan; those without a valid reading are left out.
     """
-    range_max = scan.range_max
+    range_max = min(scan.range_max, _FARTHEST_M)
     if config.laser_max_range > 0.0:
         range_max = min(range_max, config.laser_max_range)
     count = min(config.max_beams, len(scan))

@@ -15,6 +15,9 @@ HEADINGS = 36
 
 EMPTY = -1
 
+# A belief that tracks fills some tens of bins: tables start small, and stay in the nearest cache.
+FIRST_ENTRIES = 128
+
 
 @njit(cache=True, nogil=True)
 def bin_of(x: float, y: float, yaw: float) -> tuple[int, int, int]:
@@ -30,6 +33,19 @@ def new_table(entries: int) -> NDArray[np.int64]:
     while size < 2 * entries:
         size *= 2
     return np.full((size, 2), EMPTY, np.int64)
+
+
+@njit(cache=True, nogil=True)
+def with_room(table: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Return a table of the same entries that can take one more beside so many; it may be new."""
+    if 2 * (count + 1) <= table.shape[0]:
+        return table
+    wider = new_table(table.shape[0])
+    for row in range(table.shape[0]):
+        if table[row, 0] != EMPTY:
+            slot = slot_of(wider, table[row, 0])
+            wider[slot, 0], wider[slot, 1] = table[row, 0], table[row, 1]
+    return wider
 
 
 @njit(cache=True, nogil=True)

@@ -9,7 +9,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from firstfix.amcl.bins import EMPTY, HEADINGS, bin_of, key_of, new_table, slot_of
+from firstfix.amcl.bins import (
+    EMPTY,
+    FIRST_ENTRIES,
+    HEADINGS,
+    bin_of,
+    key_of,
+    new_table,
+    slot_of,
+    with_room,
+)
 from firstfix.amcl.particles import Particles
 from firstfix.core.se2 import SE2
 
@@ -71,7 +80,7 @@ def _label(
 ) -> tuple[NDArray[np.int64], int]:
     """Label particles by the connected group of their bin: 26 neighbours, headings all round."""
     n = x.shape[0]
-    table = new_table(n)
+    table = new_table(FIRST_ENTRIES)
     bins = np.empty((n, 3), np.int64)
     bin_index = np.empty(n, np.int64)
     count = 0
@@ -80,6 +89,8 @@ def _label(
         key = key_of(column, row, turn)
         slot = slot_of(table, key)
         if table[slot, 0] == EMPTY:
+            table = with_room(table, count)
+            slot = slot_of(table, key)
             table[slot, 0], table[slot, 1] = key, count
             bins[count, 0], bins[count, 1], bins[count, 2] = column, row, turn
             count += 1

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from firstfix.amcl.beams import choose_beams
 from firstfix.amcl.clusters import Cluster, find_clusters
-from firstfix.amcl.config import AmclConfig
+from firstfix.amcl.config import AmclConfig, MotionModel
 from firstfix.amcl.kld import adapted_size
 from firstfix.amcl.motion import propagate
 from firstfix.amcl.particles import Particles, equal_weights
@@ -116,7 +116,7 @@ def step(
         The state after.
     """
     particles = propagate(state.particles, increment, config, rng)
-    if _at_rest(increment):
+    if _at_rest(increment, config):
         particles = _roughened(particles, rng)
     likelihood, fit = weigh(particles, choose_beams(scan, config), sensor)
     particles = particles.reweighed(likelihood)
@@ -157,7 +157,9 @@ def _resampled(
     return equal_weights(poses)
 
 
-def _at_rest(increment: SE2) -> bool:
+def _at_rest(increment: SE2, config: AmclConfig) -> bool:
+    if config.robot_model_type is MotionModel.STATIONARY:
+        return True
     return math.hypot(increment.x, increment.y) < _REST_M and abs(increment.yaw) < _REST_RAD
 
 

@@ -8,7 +8,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from firstfix.amcl.bins import EMPTY, bin_of, key_of, new_table, slot_of
+from firstfix.amcl.bins import (
+    EMPTY,
+    FIRST_ENTRIES,
+    bin_of,
+    key_of,
+    new_table,
+    slot_of,
+    with_room,
+)
 from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.particles import Particles
 from firstfix.amcl.resampling import systematic
@@ -83,13 +91,14 @@ def _draws_until_enough(
     pf_err: float,
     pf_z: float,
 ) -> int:
-    table = new_table(drawn.shape[0])
+    table = new_table(FIRST_ENTRIES)
     bins, needed = 0, 1.0
     for k in range(drawn.shape[0]):
         i = drawn[k]
-        slot = slot_of(table, key_of(*bin_of(x[i], y[i], yaw[i])))
-        if table[slot, 0] == EMPTY:
-            table[slot, 0] = key_of(*bin_of(x[i], y[i], yaw[i]))
+        key = key_of(*bin_of(x[i], y[i], yaw[i]))
+        if table[slot_of(table, key), 0] == EMPTY:
+            table = with_room(table, bins)
+            table[slot_of(table, key), 0] = key
             bins += 1
             needed = _needed(bins, pf_err, pf_z)
         if k + 1 >= least and k + 1 >= needed:

@@ -8,6 +8,7 @@ a variance.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -29,8 +30,20 @@ _PIECE_M = 0.5
 _PIECE_RAD = 0.4
 _MAX_PIECES = 1000
 
-Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
-"""Direction (rad), length (m), way to its left (m) and turn (rad) of every particle, shape (n,)."""
+
+class Motion(NamedTuple):
+    """A motion and the standard deviations of its errors, the same for all particles.
+
+    An error in the first direction stays in the heading; what goes to the left is error only.
+    """
+
+    direction: float  # of travel against the heading before, rad
+    length: float  # m
+    turn: float  # of the heading, rad
+    sigma_direction: float
+    sigma_length: float
+    sigma_left: float
+    sigma_turn: float
 
 
 def propagate(
@@ -57,13 +70,14 @@ def propagate(
     if config.robot_model_type is MotionModel.STATIONARY:
         return particles
     count, T_piece = pieces(T_before_after, config)
+    if config.robot_model_type is MotionModel.OMNIDIRECTIONAL:
+        motion = _omnidirectional(T_piece, config)
+    else:
+        motion = _differential(T_piece, config)
     x, y, yaw = particles.x, particles.y, particles.yaw
     for _ in range(count):
-        if config.robot_model_type is MotionModel.OMNIDIRECTIONAL:
-            motion = _omnidirectional(T_piece, config, len(particles), rng)
-        else:
-            motion = _differential(T_piece, config, len(particles), rng)
-        x, y, yaw = _drive(x, y, yaw, *motion)
+        noise = rng.standard_normal((3, len(particles)), np.float32)
+        x, y, yaw = _drive(x, y, yaw, tuple(motion), noise)
     return Particles(x, y, yaw, particles.weight)
 
 
@@ -96,9 +110,7 @@ def pieces(T_before_after: SE2, config: AmclConfig) -> tuple[int, SE2]:
     return n, SE2(chord * math.cos(along), chord * math.sin(along), turn / n)
 
 
-def _differential(
-    T_before_after: SE2, config: AmclConfig, n: int, rng: np.random.Generator
-) -> Motion:
+def _differential(T_before_after: SE2, config: AmclConfig) -> Motion:
     """Turn, drive, turn; each with noise (table 5.6)."""
     trans = math.hypot(T_before_after.x, T_before_after.y)
     rot1 = math.atan2(T_before_after.y, T_before_after.x)
@@ -106,31 +118,29 @@ def _differential(
     turns = (rot1, rot2) if trans >= _NO_TRANSLATION_M else (0.0, T_before_after.yaw)
     # Backwards is no half turn and back: the noise follows the smaller angle.
     turn1, turn2 = (min(angle_error(r, 0.0), angle_error(r, math.pi)) for r in turns)
-    sigma1 = math.sqrt(config.alpha1 * turn1**2 + config.alpha2 * trans**2)
-    sigma_trans = math.sqrt(config.alpha3 * trans**2 + config.alpha4 * (turn1**2 + turn2**2))
-    sigma2 = math.sqrt(config.alpha1 * turn2**2 + config.alpha2 * trans**2)
-    noise = rng.standard_normal((3, n), np.float32)
-    first = rot1 + sigma1 * noise[0].astype(np.float64)
-    length = trans + sigma_trans * noise[1].astype(np.float64)
-    second = rot2 + sigma2 * noise[2].astype(np.float64)
-    return first, length, np.zeros(n), first + second
+    return Motion(
+        direction=rot1,
+        length=trans,
+        turn=T_before_after.yaw,
+        sigma_direction=math.sqrt(config.alpha1 * turn1**2 + config.alpha2 * trans**2),
+        sigma_length=math.sqrt(config.alpha3 * trans**2 + config.alpha4 * (turn1**2 + turn2**2)),
+        sigma_left=0.0,
+        sigma_turn=math.sqrt(config.alpha1 * turn2**2 + config.alpha2 * trans**2),
+    )
 
 
-def _omnidirectional(
-    T_before_after: SE2, config: AmclConfig, n: int, rng: np.random.Generator
-) -> Motion:
+def _omnidirectional(T_before_after: SE2, config: AmclConfig) -> Motion:
     """Drive in any direction while turning; noise along, across and in turn."""
     trans = math.hypot(T_before_after.x, T_before_after.y)
     turn = T_before_after.yaw
-    sigma_trans = math.sqrt(config.alpha3 * trans**2 + config.alpha1 * turn**2)
-    sigma_turn = math.sqrt(config.alpha4 * turn**2 + config.alpha2 * trans**2)
-    sigma_strafe = math.sqrt(config.alpha1 * turn**2 + config.alpha5 * trans**2)
-    noise = rng.standard_normal((3, n), np.float32)
-    return (
-        np.full(n, math.atan2(T_before_after.y, T_before_after.x)),
-        trans + sigma_trans * noise[0].astype(np.float64),
-        sigma_strafe * noise[1].astype(np.float64),
-        turn + sigma_turn * noise[2].astype(np.float64),
+    return Motion(
+        direction=math.atan2(T_before_after.y, T_before_after.x),
+        length=trans,
+        turn=turn,
+        sigma_direction=0.0,
+        sigma_length=math.sqrt(config.alpha3 * trans**2 + config.alpha1 * turn**2),
+        sigma_left=math.sqrt(config.alpha1 * turn**2 + config.alpha5 * trans**2),
+        sigma_turn=math.sqrt(config.alpha4 * turn**2 + config.alpha2 * trans**2),
     )
 
 
@@ -139,19 +149,22 @@ def _drive(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
     yaw: NDArray[np.float64],
-    direction: NDArray[np.float64],
-    length: NDArray[np.float64],
-    strafe: NDArray[np.float64],
-    turn: NDArray[np.float64],
+    motion: tuple[float, ...],
+    noise: NDArray[np.float32],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    direction, length, turn, sigma_direction, sigma_length, sigma_left, sigma_turn = motion
     n = x.shape[0]
     new_x, new_y, new_yaw = np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):
-        along = yaw[i] + direction[i]
+        astray = sigma_direction * np.float64(noise[0, i])
+        ahead = length + sigma_length * np.float64(noise[1, i])
+        # No model errs in direction and to the left: they can share a draw.
+        left = sigma_left * np.float64(noise[0, i])
+        along = yaw[i] + direction + astray
         c, s = math.cos(along), math.sin(along)
-        new_x[i] = x[i] + c * length[i] - s * strafe[i]
-        new_y[i] = y[i] + s * length[i] + c * strafe[i]
-        turned = yaw[i] + turn[i]
+        new_x[i] = x[i] + c * ahead - s * left
+        new_y[i] = y[i] + s * ahead + c * left
+        turned = yaw[i] + turn + astray + sigma_turn * np.float64(noise[2, i])
         wrapped = turned - 2.0 * math.pi * math.ceil(turned / (2.0 * math.pi) - 0.5)
         # Rounding may leave it beyond either end by a last bit.
         new_yaw[i] = wrapped if -math.pi < wrapped <= math.pi else math.pi
