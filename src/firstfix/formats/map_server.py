@@ -13,7 +13,6 @@ The meaning of a pixel follows Nav2 since Jazzy. Where its predecessors differ, 
 from __future__ import annotations
 
 import os
-import uuid
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +25,7 @@ from firstfix.formats.map_files import show, unreadable
 from firstfix.formats.map_image import open_image
 from firstfix.formats.map_pixels import DEFAULT_MAX_CELLS, MapImage, Strip
 from firstfix.formats.map_yaml import MapMode, MapYaml, check_resolution, read_yaml
+from firstfix.formats.whole_files import write_whole
 
 # What every map_saver writes; p of 205 is 0.19608, just above the threshold.
 GREY_OCCUPIED, GREY_UNKNOWN, GREY_FREE = 0, 205, 254
@@ -106,8 +106,9 @@ def save_map(grid: OccupancyGrid, yaml_path: str | os.PathLike[str]) -> Path:
     image = path.with_suffix(".pgm")
     try:
         header = _yaml_text(grid, image.name, mode).encode()
-        _replace(image, f"P5\n{grid.width} {grid.height}\n255\n".encode(), _greys(grid, mode).data)
-        _replace(path, header)
+        start = f"P5\n{grid.width} {grid.height}\n255\n".encode()
+        write_whole(image, (start, _greys(grid, mode).data))
+        write_whole(path, (header,))
     except OSError as error:
         raise unreadable(path, error) from error
     except ValueError as error:  # NUL, or what UTF-8 cannot hold
@@ -194,17 +195,3 @@ def _yaml_text(grid: OccupancyGrid, image: str, mode: MapMode) -> str:
     return yaml.safe_dump(
         entries, sort_keys=False, default_flow_style=None, allow_unicode=True, width=4096
     )
-
-
-def _replace(path: Path, *parts: bytes | memoryview) -> None:
-    """Write a file under another name first, so that nobody ever sees half of it."""
-    draft = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-    try:
-        with draft.open("xb") as file:
-            for part in parts:
-                file.write(part)
-            file.flush()
-            os.fsync(file.fileno())
-        draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)

@@ -90,7 +90,7 @@ def replace_file(path: Path, pieces: Iterable[bytes]) -> None:
                 received=f"{path}, which is a folder or a device",
                 remedy="give the name of a file",
             )
-        _write(target, pieces)
+        write_whole(target, pieces)
     except OSError as error:
         raise unreachable(path, error) from error
     except (ValueError, RuntimeError) as error:  # names that no file system holds, links in a ring
@@ -101,7 +101,16 @@ def replace_file(path: Path, pieces: Iterable[bytes]) -> None:
         ) from error
 
 
-def _write(target: Path, pieces: Iterable[bytes]) -> None:
+def write_whole(target: Path, pieces: Iterable[bytes | memoryview]) -> None:
+    """Write a draft and give it the name of the file; raises OSError, and then nothing changed.
+
+    Parameters
+    ----------
+    target : Path
+        The file itself, no link to it.
+    pieces : iterable of bytes
+        The content, in order.
+    """
     # Renaming is atomic only within one folder, and the name must not be anybody else's.
     draft = target.with_name(f".{uuid.uuid4().hex}.draft")
     try:
