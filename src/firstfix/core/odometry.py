@@ -1,0 +1,79 @@
+"""What a robot reports besides scans: how its wheels turned, and that something happened to it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from firstfix.core.errors import InputError
+from firstfix.core.se2 import SE2
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Where the wheels say that the robot is.
+
+    Parameters
+    ----------
+    stamp : float
+        Time, s.
+    T_odom_base : SE2
+        Pose of the base in the odometry frame: smooth, and adrift.
+
+    Raises
+    ------
+    InputError
+        If the stamp is not finite.
+    """
+
+    stamp: float
+    T_odom_base: SE2
+
+    def __post_init__(self) -> None:
+        _check_stamp(self.stamp)
+
+
+class SignalKind(Enum):
+    """What sensors of the base can tell; the values are Kobuki's words."""
+
+    CLIFF = "cliff"
+    WHEEL_DROP = "wheel_drop"
+    PICKED_UP = "picked_up"
+    BUMPER = "bumper"
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """A sensor of the base that begins or ceases to report.
+
+    Parameters
+    ----------
+    stamp : float
+        Time, s.
+    kind : SignalKind
+        Which sensor.
+    active : bool
+        True from when a wheel drops, a bumper is pressed...; False from when that is over.
+
+    Raises
+    ------
+    InputError
+        If the stamp is not finite.
+    """
+
+    stamp: float
+    kind: SignalKind
+    active: bool
+
+    def __post_init__(self) -> None:
+        _check_stamp(self.stamp)
+
+
+def _check_stamp(stamp: float) -> None:
+    if not math.isfinite(stamp):
+        raise InputError(
+            expected="a finite stamp in seconds",
+            received=f"stamp {stamp}",
+            remedy="look for NaN or infinity where the time comes from",
+        )
