@@ -93,16 +93,41 @@ class Lidar:
         LaserScan
             What the sensor says; inf where it got no return.
         """
-        blind = self._sweep(np.full(self.beams, np.inf), stamp)
         T_map_laser = T_map_base @ self.T_base_laser
-        true = expected_ranges(grid, T_map_laser, blind.bearings, self.range_max)
+        true = expected_ranges(grid, T_map_laser, self.bearings, self.range_max)
+        return self.measure(true, rng, stamp)
+
+    @property
+    def bearings(self) -> NDArray[np.float64]:
+        """Directions of the beams seen from above in the upright sensor frame, shape (n,), rad."""
+        return self._as_scan(np.full(self.beams, np.inf), 0.0).bearings
+
+    def measure(
+        self, true: NDArray[np.float64], rng: np.random.Generator, stamp: float
+    ) -> LaserScan:
+        """Make a scan of true ranges.
+
+        Parameters
+        ----------
+        true : ndarray, shape (beams,)
+            What an ideal sensor measures, m; inf where nothing is within reach.
+        rng : numpy.random.Generator
+            Source of noise and dropouts.
+        stamp : float
+            Time of the scan, s.
+
+        Returns
+        -------
+        LaserScan
+            What this sensor says; inf where it got no return.
+        """
         measured = true + self.sigma_m * rng.standard_normal(self.beams)
         lost = rng.random(self.beams) < self.dropout
         # Noise must not push a return beyond the limit, where it would mean open space to a reader.
         measured = np.minimum(measured, np.nextafter(np.float32(self.range_max), np.float32(0.0)))
-        return self._sweep(np.where(np.isinf(true) | lost, np.inf, measured), stamp)
+        return self._as_scan(np.where(np.isinf(true) | lost, np.inf, measured), stamp)
 
-    def _sweep(self, ranges: NDArray[np.float64], stamp: float) -> LaserScan:
+    def _as_scan(self, ranges: NDArray[np.float64], stamp: float) -> LaserScan:
         first = -self.angle_increment * (self.beams - 1) / 2
         if self.fov == FULL_TURN:
             first = -self.fov / 2

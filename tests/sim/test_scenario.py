@@ -1,0 +1,112 @@
+"""A script, a map and a seed make one story."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.odometry import Odometry, Signal, SignalKind
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.sim.drawing import Drawing
+from firstfix.sim.phases import CarryTo, DriveTo, Stand, Teleport
+from firstfix.sim.scenario import Scenario, run
+from firstfix.sim.stage import Disturbance, Moment
+
+EVERYTHING = [
+    Stand(0.3),
+    DriveTo(SE2(4.0, 1.0, 0.0)),
+    Teleport(),
+    Stand(0.3),
+    CarryTo(SE2(1.0, 1.0, 0.0), seconds=1.0),
+    Stand(0.3),
+]
+
+
+@pytest.fixture(scope="module")
+def flat() -> OccupancyGrid:
+    """Two rooms of 3 x 3 m with a door between them."""
+    plan = Drawing(6.0, 3.0, 0.05, 0.5)
+    plan.room(0.0, 0.0, 3.0, 3.0)
+    plan.room(3.0, 0.0, 6.0, 3.0)
+    plan.door(3.0, 2.0)
+    return plan.grid()
+
+
+@pytest.fixture(scope="module")
+def story(flat: OccupancyGrid) -> list[Moment]:
+    return list(run(Scenario(EVERYTHING, start=SE2(1.0, 1.0, 0.5)), flat, seed=1))
+
+
+def told(story: list[Moment]) -> list[object]:
+    """Make events comparable."""
+    return [
+        (event.stamp, event.ranges.tolist()) if isinstance(event, LaserScan) else event
+        for moment in story
+        for event in moment.events
+    ]
+
+
+def test_one_seed_tells_one_story_and_another_seed_another(
+    flat: OccupancyGrid, story: list[Moment]
+) -> None:
+    script = Scenario(EVERYTHING, start=SE2(1.0, 1.0, 0.5))
+    assert told(list(run(script, flat, seed=1))) == told(story)
+    assert told(list(run(script, flat, seed=2))) != told(story)
+
+
+def test_events_come_in_the_order_of_their_stamps(story: list[Moment]) -> None:
+    stamps = [event.stamp for moment in story for event in moment.events]
+    assert stamps == sorted(stamps)
+    np.testing.assert_allclose([m.stamp for m in story], 0.1 * np.arange(len(story)), atol=1e-9)
+    for moment in story:
+        (scan,) = (event for event in moment.events if isinstance(event, LaserScan))
+        assert scan.stamp == moment.stamp
+        assert sum(isinstance(event, Odometry) for event in moment.events) == 5
+
+
+def test_phases_follow_one_another_and_what_was_done_to_the_robot_is_marked(
+    story: list[Moment],
+) -> None:
+    phases = [m.phase for m in story]
+    assert [p for i, p in enumerate(phases) if i == 0 or phases[i - 1] != p] == [
+        "stand",
+        "drive",
+        "stand",
+        "carry",
+        "stand",
+    ]
+    marked = [(m.phase, m.disturbance) for m in story if m.disturbance is not None]
+    assert marked == [("stand", Disturbance.TELEPORTED), ("stand", Disturbance.CARRIED)]
+
+
+def test_a_drive_ends_at_its_goal(story: list[Moment]) -> None:
+    end = next(m for m in story if m.disturbance is Disturbance.TELEPORTED)
+    before = story[story.index(end) - 1].T_map_base
+    assert before.distance_to(SE2(4.0, 1.0, 0.0)) < 0.15
+
+
+def test_neither_teleport_nor_carrying_is_seen_by_the_wheels(story: list[Moment]) -> None:
+    odometry = [e.T_odom_base for m in story for e in m.events if isinstance(e, Odometry)]
+    steps = [a.distance_to(b) for a, b in itertools.pairwise(odometry)]
+    assert max(steps) < 0.02
+    truth = [m.T_map_base for m in story]
+    assert max(a.distance_to(b) for a, b in itertools.pairwise(truth)) > 0.2
+
+
+def test_carrying_raises_the_wheel_drop_and_setting_down_clears_it(story: list[Moment]) -> None:
+    signals = [e for m in story for e in m.events if isinstance(e, Signal)]
+    drops = [s for s in signals if s.kind is SignalKind.WHEEL_DROP]
+    assert [s.active for s in drops] == [True, False]
+    assert drops[0].stamp == next(m.stamp for m in story if m.phase == "carry")
+    assert drops[1].stamp == pytest.approx(drops[0].stamp + 1.0)
+    assert story[-1].T_map_base == SE2(1.0, 1.0, 0.0)
+
+
+def test_a_scan_says_where_the_sensor_sits(story: list[Moment]) -> None:
+    scan = next(e for e in story[0].events if isinstance(e, LaserScan))
+    assert scan.T_base_laser == SE2(0.07, 0.0, 0.0)
+    assert len(scan) == 360
+    assert math.isclose(scan.angle_increment, math.radians(1.0))
