@@ -48,6 +48,27 @@ def nothing_to_match(scan: LaserScan, hits: int, needed: int, elapsed_s: float) 
     )
 
 
+def to_cells(grid: OccupancyGrid, scan: LaserScan, T_map_base: SE2) -> NDArray[np.float64]:
+    """Bring a robot's pose in the map to its sensor's pose in cells: the way back of `to_map`.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+    scan : LaserScan
+        Knows where the sensor sits.
+    T_map_base : SE2
+        The robot's pose.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        x, y (cells), heading (rad) of the sensor in the grid.
+    """
+    T_grid_laser = grid.T_map_grid.inverse() @ T_map_base @ scan.T_base_laser
+    return T_grid_laser.as_array() / [grid.resolution, grid.resolution, 1.0]
+
+
 def to_map(
     grid: OccupancyGrid,
     scan: LaserScan,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from firstfix.core.estimate import Hypothesis, LocateResult, SearchReport, Verdict
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields, build_fields
 from firstfix.global_localization import exhaustive
 from firstfix.global_localization.answer import (
@@ -21,6 +23,7 @@ from firstfix.global_localization.answer import (
 )
 from firstfix.global_localization.beams import usable_beams
 from firstfix.global_localization.config import LocateConfig, Method
+from firstfix.global_localization.examine import examine, locate_near
 from firstfix.global_localization.places import distinct_places
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.search import search
@@ -94,6 +97,40 @@ class Locator:
             return locate(scan, self.fields, self.config)
         poses = exhaustive.FAST if self.method is Method.PAPER else exhaustive.BASIC
         return exhaustive.locate(scan, self.fields, poses)
+
+    def examine(self, scan: LaserScan, poses: Sequence[SE2]) -> tuple[Hypothesis, ...]:
+        """Tell how well a scan fits each of some poses: `firstfix.global_localization.examine`.
+
+        Parameters
+        ----------
+        scan : LaserScan
+            The scan, with the sensor's pose on the robot.
+        poses : sequence of SE2
+            ``T_map_base`` proposed; at least one.
+
+        Returns
+        -------
+        tuple of Hypothesis
+            One for each pose; the probability is that of the place against a wrong map.
+        """
+        return examine(scan, poses, self.fields)
+
+    def locate_near(self, scan: LaserScan, T_map_base: SE2) -> Hypothesis:
+        """Find the best pose within about a metre and 40 degrees of a given one.
+
+        Parameters
+        ----------
+        scan : LaserScan
+            The scan, with the sensor's pose on the robot.
+        T_map_base : SE2
+            Where to look.
+
+        Returns
+        -------
+        Hypothesis
+            The best; its probability is that of the place against a wrong map.
+        """
+        return locate_near(scan, T_map_base, self.fields)
 
 
 def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateResult:

@@ -1,0 +1,1 @@
+"""Between the system and the world: convert, call, publish."""

@@ -1,0 +1,77 @@
+"""What can happen to a localizer; every input carries its own time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.odometry import Odometry, Signal
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class NewMap:
+    """The map, or another one: another floor.
+
+    Parameters
+    ----------
+    stamp : float
+        Time, s.
+    grid : OccupancyGrid
+        The map.
+    """
+
+    stamp: float
+    grid: OccupancyGrid
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PoseHint:
+    """A person says where the robot is.
+
+    Parameters
+    ----------
+    stamp : float
+        Time, s.
+    T_map_base : SE2
+        The pose.
+    covariance : ndarray, shape (3, 3)
+        Of x (m), y (m), yaw (rad) in the map frame.
+    """
+
+    stamp: float
+    T_map_base: SE2
+    covariance: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Reset:
+    """Forget where the robot is, and search.
+
+    Parameters
+    ----------
+    stamp : float
+        Time, s.
+    """
+
+    stamp: float
+
+
+@dataclass(frozen=True, slots=True)
+class NoMotionUpdate:
+    """Use the next scan although the robot has not moved.
+
+    Parameters
+    ----------
+    stamp : float
+        Time, s.
+    """
+
+    stamp: float
+
+
+Input = NewMap | LaserScan | Odometry | Signal | PoseHint | Reset | NoMotionUpdate

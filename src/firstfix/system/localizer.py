@@ -1,0 +1,298 @@
+"""The system: one input in, some outputs out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.amcl.clusters import Cluster
+from firstfix.amcl.filter import start
+from firstfix.amcl.initial import around_hypotheses, around_pose
+from firstfix.amcl.particles import Particles
+from firstfix.amcl.sensor import build_sensor
+from firstfix.amcl.track import Track, Tracker
+from firstfix.core.estimate import Evidence, Hypothesis, LocateResult, Verdict
+from firstfix.core.odometry import Odometry, Signal, SignalKind
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.global_localization.locate import Locator
+from firstfix.system.config import LocalizerConfig
+from firstfix.system.contest import Contest, Standing
+from firstfix.system.deciding_motion import deciding_motion
+from firstfix.system.inputs import Input, NewMap, NoMotionUpdate, PoseHint, Reset
+from firstfix.system.odometry_buffer import OdometryBuffer
+from firstfix.system.outputs import Hypotheses, InitialPose, Output, Status, TrackedPose
+from firstfix.system.transitions import Event, State, after
+from firstfix.system.watch import Finding, Watch
+
+# While one of these is active the robot is not on its wheels.
+_LIFTED = {SignalKind.CLIFF, SignalKind.WHEEL_DROP, SignalKind.PICKED_UP}
+
+# The covariance of the static stage is that of one scan in a perfect map; a track begins wider.
+_BEGIN_COVARIANCE = np.diag([0.03**2, 0.03**2, np.radians(1.0) ** 2])
+
+# A robot that stands where nothing fits sees the same again: people may go, so once a second.
+_PATIENCE_S = 1.0
+_MOVED_M = 0.1
+
+
+class Localizer:
+    """Finds a robot, follows it, notices when it was carried away, and finds it again.
+
+    No clock, no thread, no socket: time is in the inputs. The same inputs give the same outputs.
+
+    Parameters
+    ----------
+    config : LocalizerConfig, optional
+        Settings.
+    cache_dir : Path, optional
+        Folder of prepared maps; by default every map is prepared anew.
+    """
+
+    def __init__(
+        self, config: LocalizerConfig | None = None, cache_dir: Path | None = None
+    ) -> None:
+        self.config = config or LocalizerConfig()
+        self.state = State.NO_MAP
+        self._cache_dir = cache_dir
+        self._rng = np.random.default_rng(max(0, self.config.amcl.random_seed))
+        self._odometry = OdometryBuffer()
+        self._waiting: LaserScan | None = None
+        self._lifted: set[SignalKind] = set()
+        self._found_nothing_at: tuple[float, SE2] | None = None
+        self._update_asked = False
+        self._track: Track | None = None
+        self._locator: Locator
+        self._tracker: Tracker
+        self._watch: Watch
+        self._contest: Contest
+
+    @property
+    def particles(self) -> Particles | None:
+        """The belief; None while there is none."""
+        return self._track.state.particles if self._track is not None else None
+
+    def handle(self, given: Input) -> list[Output]:
+        """Take in what happened.
+
+        Parameters
+        ----------
+        given : Input
+            A map, scan, odometry message, signal of the base, hint or request. Scans and odometry
+            may come in any order as long as each kind is in the order of its stamps: a scan waits
+            until odometry reaches its stamp, and gives way to a newer one.
+
+        Returns
+        -------
+        list of Output
+            What there is to say about it, in order; often nothing.
+
+        Raises
+        ------
+        MapError
+            If a new map cannot be searched. The state is that of before.
+        """
+        if isinstance(given, NewMap):
+            return self._take_map(given)
+        if isinstance(given, Odometry):
+            return self._take_odometry(given)
+        if self.state is State.NO_MAP:
+            return [Status(given.stamp, self.state, "no map yet")]
+        if isinstance(given, LaserScan):
+            self._waiting = given
+            return self._take_waiting_scan()
+        if isinstance(given, Signal):
+            return self._take_signal(given)
+        if isinstance(given, PoseHint):
+            return self._take_hint(given)
+        if isinstance(given, Reset):
+            return [self._forget(given.stamp, Event.RESET, "told to search anew")]
+        return self._take_update_request(given)
+
+    # ---- inputs
+
+    def _take_map(self, given: NewMap) -> list[Output]:
+        locator = Locator(given.grid, config=self.config.locate, cache_dir=self._cache_dir)
+        self._locator = locator
+        sensor = build_sensor(given.grid, self.config.amcl)
+        self._tracker = Tracker(sensor, self.config.amcl, self._no_injection)
+        return [self._forget(given.stamp, Event.MAP_CAME, "a map came: searching")]
+
+    def _take_odometry(self, given: Odometry) -> list[Output]:
+        before = self._odometry.last
+        if self._odometry.add(given):
+            self._follow_jump(before, given)
+        return self._take_waiting_scan()
+
+    def _take_signal(self, given: Signal) -> list[Output]:
+        if given.kind not in _LIFTED:
+            return []
+        if not given.active:
+            self._lifted.discard(given.kind)
+            return []
+        self._lifted.add(given.kind)
+        reason = f"{given.kind.value}: waiting until the robot stands again, then searching"
+        return [self._forget(given.stamp, Event.KIDNAPPED, reason)]
+
+    def _take_hint(self, given: PoseHint) -> list[Output]:
+        last = self._odometry.last
+        if last is None:
+            return [Status(given.stamp, self.state, "a hint is of no use before odometry")]
+        n = self.config.amcl.max_particles
+        belief = around_pose(given.T_map_base, given.covariance, n, self._rng)
+        self._begin(belief, last.T_odom_base)
+        self.state = after(self.state, Event.PERSON_SAID)
+        return [Status(given.stamp, self.state, "a person says where; the next scans will tell")]
+
+    def _take_update_request(self, given: NoMotionUpdate) -> list[Output]:
+        self._update_asked = True
+        return [Status(given.stamp, self.state, "the next scan will be used in any case")]
+
+    def _take_waiting_scan(self) -> list[Output]:
+        scan, last = self._waiting, self._odometry.last
+        if scan is None or last is None or self.state is State.NO_MAP:
+            return []
+        if scan.stamp > last.stamp:
+            return []
+        self._waiting = None
+        T_odom_base = self._odometry.at(scan.stamp)
+        if T_odom_base is None:
+            reason = "a scan is older than the odometry that is known: left out"
+            return [Status(scan.stamp, self.state, reason)]
+        if self._lifted:
+            return []
+        if self.state is State.SEARCHING:
+            return self._search(scan, T_odom_base)
+        if self.state is State.TRACKING:
+            return self._decide(scan, T_odom_base)
+        return self._follow(scan, T_odom_base)
+
+    # ---- states
+
+    def _search(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
+        if not self._worth_searching(scan, T_odom_base):
+            return []
+        result = self._locator.locate(scan)
+        best = result.best
+        self._found_nothing_at = None
+        if best is None or result.verdict is Verdict.NO_MATCH:
+            self._found_nothing_at = scan.stamp, T_odom_base
+            evidence = best.evidence if best is not None else None
+            return [Status(scan.stamp, self.state, result.reason, evidence)]
+        if result.verdict is Verdict.UNIQUE:
+            return self._arrive(scan, T_odom_base, best, Event.ONE_PLACE, result.reason)
+        n = self.config.amcl.max_particles
+        self._begin(around_hypotheses(result.hypotheses, n, self._rng), T_odom_base)
+        self.state = after(self.state, Event.SEVERAL_PLACES)
+        return self._tell_places(scan, result)
+
+    def _decide(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
+        track = self._move(scan, T_odom_base)
+        standing, place = self._contest.look(scan, T_odom_base, _carried(track, T_odom_base))
+        if standing is Standing.WON and place is not None:
+            reason = "one place has won, and the scan fits there"
+            return self._arrive(scan, T_odom_base, place, Event.PLACE_WON, reason)
+        if standing is Standing.LOST:
+            reason = "the scans fit none of the places that were left: searching anew"
+            return [self._forget(scan.stamp, Event.LOST, reason)]
+        if self._contest.result is None:
+            return []
+        return self._tell_places(scan, self._contest.result)
+
+    def _follow(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
+        track = self._move(scan, T_odom_base)
+        T_map_base = track.T_map_odom @ T_odom_base
+        look = self._watch.look(scan, T_odom_base, T_map_base)
+        if look.finding is Finding.ELSEWHERE:
+            reason = f"found {look.place.pose.distance_to(T_map_base):.1f} m from the track"
+            return self._arrive(scan, T_odom_base, look.place, Event.FOUND_ELSEWHERE, reason)
+        evidence = look.place.evidence
+        if look.finding is Finding.CONTRADICTED:
+            reason = f"only {evidence.explained:.0%} of the beams fit here, for too long: searching"
+            return [self._forget(scan.stamp, Event.LOST, reason, evidence)]
+        said = f"{evidence.explained:.0%} of the beams fit"
+        reason = said if look.finding is Finding.FITS else f"doubtful: only {said}"
+        covariance = track.state.estimate.covariance
+        return [
+            TrackedPose(scan.stamp, T_map_base, covariance, track.T_map_odom),
+            Status(scan.stamp, self.state, reason, evidence),
+        ]
+
+    # ---- steps
+
+    def _arrive(
+        self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis, event: Event, reason: str
+    ) -> list[Output]:
+        """Publish a pose, and follow from there."""
+        covariance = place.covariance + _BEGIN_COVARIANCE
+        n = self.config.amcl.max_particles
+        self._begin(around_pose(place.pose, covariance, n, self._rng), T_odom_base)
+        self.state = after(self.state, event)
+        return [
+            InitialPose(scan.stamp, place.pose, covariance),
+            TrackedPose(scan.stamp, place.pose, covariance, place.pose @ T_odom_base.inverse()),
+            Status(scan.stamp, self.state, reason, place.evidence),
+        ]
+
+    def _worth_searching(self, scan: LaserScan, T_odom_base: SE2) -> bool:
+        """Tell whether a scan may say what the last, which fitted nowhere, did not."""
+        if self._found_nothing_at is None:
+            return True
+        stamp, T_odom_then = self._found_nothing_at
+        moved = T_odom_then.distance_to(T_odom_base) >= _MOVED_M
+        return moved or not 0.0 <= scan.stamp - stamp < _PATIENCE_S
+
+    def _begin(self, belief: Particles, T_odom_base: SE2) -> None:
+        self._track = Track(start(belief), T_odom_base)
+        self._watch = Watch(self._locator, self.config.watch)
+        self._contest = Contest(self._locator, self.config.watch)
+
+    def _move(self, scan: LaserScan, T_odom_base: SE2) -> Track:
+        assert self._track is not None  # noqa: S101 - the states that follow have one
+        step = self._tracker.update if self._update_asked else self._tracker.follow
+        self._update_asked = False
+        self._track = step(self._track, T_odom_base, scan, self._rng)
+        return self._track
+
+    def _forget(
+        self, stamp: float, event: Event, reason: str, evidence: Evidence | None = None
+    ) -> Status:
+        self._track = None
+        self._waiting = None
+        self.state = after(self.state, event)
+        return Status(stamp, self.state, reason, evidence)
+
+    def _tell_places(self, scan: LaserScan, result: LocateResult) -> list[Output]:
+        outputs: list[Output] = [
+            Hypotheses(scan.stamp, result.hypotheses),
+            Status(scan.stamp, self.state, result.reason),
+        ]
+        motion = deciding_motion(scan, result.hypotheses, self._locator.fields.grid)
+        return [*outputs, motion] if motion is not None else outputs
+
+    def _follow_jump(self, before: Odometry | None, now: Odometry) -> None:
+        """Go on at the same pose in a new odometry frame; the next scan will tell whether."""
+        if self._track is None or before is None:
+            return
+        T_map_base = self._track.T_map_odom @ before.T_odom_base
+        T_before_now = self._track.state.estimate.pose.inverse() @ T_map_base
+        # Odometry that would have brought the track here, had its frame always been the new one.
+        self._track = Track(self._track.state, now.T_odom_base @ T_before_now.inverse())
+        self._watch = Watch(self._locator, self.config.watch)
+        self._contest = Contest(self._locator, self.config.watch)
+
+    @staticmethod
+    def _no_injection(_: LaserScan, __: int, ___: np.random.Generator) -> NDArray[np.float64]:
+        """Nothing: what augmented recovery guesses at random, the watch finds by search."""
+        return np.empty((0, 3))
+
+
+def _carried(track: Track, T_odom_base: SE2) -> tuple[Cluster, ...]:
+    """Return the places of a belief at the scan, heaviest first."""
+    increment = track.T_odom_base.inverse() @ T_odom_base
+    return tuple(
+        Cluster(cluster.mass, cluster.pose @ increment, cluster.covariance)
+        for cluster in track.state.clusters
+    )

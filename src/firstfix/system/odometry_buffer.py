@@ -1,0 +1,81 @@
+"""The odometry of the last seconds, to be asked at the stamp of a scan."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections import deque
+
+from firstfix.core.angles import angle_error, wrap
+from firstfix.core.odometry import Odometry
+from firstfix.core.se2 import SE2
+
+_KEPT = 2000
+
+# No robot indoors does this between two messages; an odometry that was restarted does.
+_FASTEST_M_S = 5.0
+_FASTEST_RAD_S = 15.0
+_JUMP_M = 0.3
+_JUMP_RAD = math.radians(30.0)
+
+
+class OdometryBuffer:
+    """Odometry in the order of its stamps, up to 2000 messages."""
+
+    def __init__(self) -> None:
+        self._kept: deque[Odometry] = deque(maxlen=_KEPT)
+
+    @property
+    def last(self) -> Odometry | None:
+        """The newest message; None before the first."""
+        return self._kept[-1] if self._kept else None
+
+    def add(self, odometry: Odometry) -> bool:
+        """Take in a message; tell whether odometry has jumped, and what was before is forgotten.
+
+        Parameters
+        ----------
+        odometry : Odometry
+            The message. One with the stamp of the last replaces it.
+
+        Returns
+        -------
+        bool
+            True if the clock or the pose jumped: the odometry frame is another one.
+        """
+        last = self.last
+        jumped = last is not None and _has_jumped(last, odometry)
+        if jumped:
+            self._kept.clear()
+        elif last is not None and last.stamp == odometry.stamp:
+            self._kept.pop()
+        self._kept.append(odometry)
+        return jumped
+
+    def at(self, stamp: float) -> SE2 | None:
+        """Interpolate ``T_odom_base`` at a time; None if it is not known there, or not yet."""
+        i = bisect_left(self._kept, stamp, key=lambda odometry: odometry.stamp)
+        if i == len(self._kept):
+            return None
+        right = self._kept[i]
+        if right.stamp == stamp:
+            return right.T_odom_base
+        if i == 0:
+            return None
+        left = self._kept[i - 1]
+        share = (stamp - left.stamp) / (right.stamp - left.stamp)
+        a, b = left.T_odom_base, right.T_odom_base
+        return SE2(
+            a.x + share * (b.x - a.x),
+            a.y + share * (b.y - a.y),
+            a.yaw + share * wrap(b.yaw - a.yaw),
+        )
+
+
+def _has_jumped(last: Odometry, new: Odometry) -> bool:
+    passed = new.stamp - last.stamp
+    if passed < 0.0:
+        return True
+    way = last.T_odom_base.distance_to(new.T_odom_base)
+    turn = angle_error(last.T_odom_base.yaw, new.T_odom_base.yaw)
+    return way > _JUMP_M + _FASTEST_M_S * passed or turn > _JUMP_RAD + _FASTEST_RAD_S * passed

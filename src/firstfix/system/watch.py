@@ -1,0 +1,144 @@
+"""Is the tracked pose still right? Every scan is asked, with the static stage's evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from firstfix.core.angles import angle_error
+from firstfix.core.estimate import Hypothesis, Verdict
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.global_localization.locate import Locator
+from firstfix.system.config import WatchConfig
+
+# A place nearby must fit so much better that it is not the same fit, a little refined.
+_BETTER = 0.75
+
+
+class Finding(Enum):
+    """What a scan says about the tracked pose."""
+
+    FITS = "fits"
+    DOUBTFUL = "doubtful"
+    ELSEWHERE = "elsewhere"
+    CONTRADICTED = "contradicted"
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What came of one look.
+
+    Parameters
+    ----------
+    finding : Finding
+        The finding.
+    place : Hypothesis
+        The tracked place; with ELSEWHERE the place where the robot really is.
+    """
+
+    finding: Finding
+    place: Hypothesis
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """Another place, and how many scans in a row speak for it."""
+
+    T_map_odom: SE2
+    scans: int
+
+
+class Watch:
+    """Judges a track scan by scan; remembers since when it has been contradicted.
+
+    Parameters
+    ----------
+    locator : Locator
+        The static stage.
+    config : WatchConfig
+        Settings.
+    """
+
+    def __init__(self, locator: Locator, config: WatchConfig) -> None:
+        self._locator = locator
+        self._config = config
+        self._contradicted_since: float | None = None
+        self._candidate: Candidate | None = None
+        self._searched_at: float | None = None
+
+    def look(self, scan: LaserScan, T_odom_base: SE2, T_map_base: SE2) -> Look:
+        """Judge the tracked pose by a scan; in doubt look nearby, then everywhere.
+
+        Parameters
+        ----------
+        scan : LaserScan
+            The scan.
+        T_odom_base : SE2
+            Odometry at the scan.
+        T_map_base : SE2
+            The tracked pose at the scan.
+
+        Returns
+        -------
+        Look
+            The finding. ELSEWHERE needs several scans in a row that agree.
+        """
+        (tracked,) = self._locator.examine(scan, [T_map_base])
+        if tracked.score <= self._config.doubtful_cost:
+            self._calm_down()
+            return Look(Finding.FITS, tracked)
+        place = self._better_place(scan, tracked, T_map_base)
+        if place is not None and self._confirmed(place, T_odom_base):
+            self._calm_down()
+            return Look(Finding.ELSEWHERE, place)
+        if tracked.score <= self._config.impossible_cost:
+            self._contradicted_since = None
+        elif self._contradicted_since is None:
+            self._contradicted_since = scan.stamp
+        elif scan.stamp - self._contradicted_since >= self._config.lost_after_s:
+            return Look(Finding.CONTRADICTED, tracked)
+        return Look(Finding.DOUBTFUL, tracked)
+
+    def _better_place(
+        self, scan: LaserScan, tracked: Hypothesis, T_map_base: SE2
+    ) -> Hypothesis | None:
+        near = self._locator.locate_near(scan, T_map_base)
+        if near.score <= min(self._config.doubtful_cost, _BETTER * tracked.score):
+            return near
+        if self._searched_at is not None:
+            waited = scan.stamp - self._searched_at
+            if 0.0 <= waited < self._config.search_period_s:
+                return None
+        self._searched_at = scan.stamp
+        result = self._locator.locate(scan)
+        best = result.best
+        if best is None or best.score > self._config.doubtful_cost:
+            self._candidate = None
+            return None
+        if same_place(best.pose, T_map_base, self._config):  # nowhere does it fit better
+            self._calm_down()
+            return None
+        if result.verdict is Verdict.UNIQUE and best.score <= _BETTER * tracked.score:
+            return best
+        self._candidate = None
+        return None
+
+    def _confirmed(self, place: Hypothesis, T_odom_base: SE2) -> bool:
+        """Count the scans in a row that, carried by odometry, mean the same place."""
+        scans = 1
+        if self._candidate is not None:
+            expected = self._candidate.T_map_odom @ T_odom_base
+            if same_place(place.pose, expected, self._config):
+                scans += self._candidate.scans
+        self._candidate = Candidate(place.pose @ T_odom_base.inverse(), scans)
+        return scans >= self._config.confirmations
+
+    def _calm_down(self) -> None:
+        self._contradicted_since = None
+        self._candidate = None
+
+
+def same_place(a: SE2, b: SE2, config: WatchConfig) -> bool:
+    """Tell whether two poses are one place."""
+    return a.distance_to(b) <= config.agree_m and angle_error(a.yaw, b.yaw) <= config.agree_rad
