@@ -23,7 +23,11 @@ PLAUSIBLE = 0.05
 
 def demo(
     world: Annotated[
-        str, typer.Option(metavar="NAME|MAP.yaml", help="office, rooms, or a map of your own.")
+        str,
+        typer.Option(
+            metavar="NAME|MAP.yaml",
+            help="office, rooms, warehouse, house, corridor, or a map of your own.",
+        ),
     ] = "office",
     seed: Annotated[int, typer.Option(min=0, help="Another seed, another place.")] = 1,
     headless: Annotated[  # noqa: ARG001 - there is nothing but the story yet

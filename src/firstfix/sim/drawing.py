@@ -7,6 +7,8 @@ import numpy as np
 from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.core.se2 import SE2
 
+RESOLUTION = 0.05  # of the built-in buildings, m
+MARGIN = 1.0  # nobody has looked behind the outer walls
 HALF_WALL = 0.1
 LEG = 0.1  # a LIDAR sees the legs of a table only
 

@@ -14,6 +14,8 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.clearance import chessboard_clearance
 from firstfix.fields.distance import euclidean_distance
 
+_SAMPLE_M = 0.05  # along lines; nothing that stops a robot is much thinner
+
 
 @dataclass(frozen=True, eq=False)
 class Floor:
@@ -56,3 +58,12 @@ class Floor:
         if 0 <= column < self.grid.width and 0 <= row < self.grid.height:
             return float(self.room[row, column])
         return 0.0
+
+    def has_room(self, a: tuple[float, float], b: tuple[float, float], least_m: float) -> bool:
+        """Tell whether there is so much room (m) all along a straight line of the map frame."""
+        count = max(2, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / _SAMPLE_M))
+        points = np.linspace(a, b, count)
+        columns, rows = np.floor(self.grid.to_cells(points)).astype(np.intp).T
+        height, width = self.room.shape
+        inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+        return bool(inside.all() and (self.room[rows, columns] >= least_m).all())

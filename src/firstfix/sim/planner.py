@@ -22,8 +22,6 @@ _CELL_M = 0.1
 _FEAR = 10.0
 # A robot that was put between table legs begins at the nearest place within this way.
 _TO_BEGINNING_M = 1.0
-# Shorter pieces of a way than this are not worth a look ahead.
-_SAMPLE_M = 0.05
 
 
 class Planner:
@@ -137,19 +135,12 @@ class Planner:
 
     def _shortened(self, way: NDArray[np.float64]) -> NDArray[np.float64]:
         """Leave out corners where the straight line has as much room as the way had."""
-        room = np.array([min(self._floor.room_at(x, y), COMFORT_M) for x, y in way.tolist()])
+        corners = way.tolist()
+        room = np.array([min(self._floor.room_at(x, y), COMFORT_M) for x, y in corners])
         kept = [0]
         for i in range(2, len(way)):
             least = float(room[kept[-1] : i + 1].min())
-            if not self._has_room(way[kept[-1]], way[i], least):
+            if not self._floor.has_room(corners[kept[-1]], corners[i], least):
                 kept.append(i - 1)
         kept.append(len(way) - 1)
         return way[kept]
-
-    def _has_room(self, a: NDArray[np.float64], b: NDArray[np.float64], least_m: float) -> bool:
-        grid = self._floor.grid
-        count = max(2, math.ceil(float(np.hypot(*(b - a))) / _SAMPLE_M))
-        points = a + np.linspace(0.0, 1.0, count)[:, None] * (b - a)
-        columns, rows = np.floor(grid.to_cells(points)).astype(np.intp).T
-        inside = (columns >= 0) & (columns < grid.width) & (rows >= 0) & (rows < grid.height)
-        return bool(inside.all() and (self._floor.room[rows, columns] >= least_m).all())

@@ -7,13 +7,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.sim.floor import Floor
+from firstfix.sim.furniture import furnished
 from firstfix.sim.lidar import Lidar
 from firstfix.sim.phases import Phase
 from firstfix.sim.robot import Kobuki
-from firstfix.sim.stage import Moment, Stage
+from firstfix.sim.stage import Moment, Shutter, Stage
 from firstfix.sim.world import random_free_pose
 
 
@@ -35,12 +37,18 @@ class Scenario:
         The robot.
     lidar : Lidar
         Its sensor, a few centimetres before its middle by default.
+    shutter : Shutter
+        Whether motion skews its scans.
+    furniture : int
+        Boxes in the building that are not in the map.
     """
 
     phases: Sequence[Phase]
     start: SE2 | None = None
     kobuki: Kobuki = field(default_factory=Kobuki)
     lidar: Lidar = field(default_factory=_usual_lidar)
+    shutter: Shutter = Shutter.AT_ONCE
+    furniture: int = 0
 
 
 def run(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Iterator[Moment]:
@@ -59,11 +67,31 @@ def run(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Iterator[Moment]:
     ------
     Moment
         One for every scan, 10 a second.
+
+    Raises
+    ------
+    InputError
+        If the robot shall begin, or be put, where it does not fit, or drive where no way leads.
     """
-    for_start, for_stage = np.random.SeedSequence(seed).spawn(2)
-    start = scenario.start
-    if start is None:
-        start = random_free_pose(grid, np.random.default_rng(for_start))
-    stage = Stage(Floor(grid), scenario.kobuki, scenario.lidar, start, for_stage)
+    for_building, for_stage = np.random.SeedSequence(seed).spawn(2)
+    rng = np.random.default_rng(for_building)
+    start = scenario.start if scenario.start is not None else random_free_pose(grid, rng)
+    if scenario.furniture:
+        keep_free = [start, *(place for phase in scenario.phases for place in phase.places)]
+        grid = furnished(grid, scenario.furniture, rng, keep_free)
+    floor = Floor(grid)
+    for place in (start, *(place for phase in scenario.phases for place in phase.places)):
+        _check_room(floor, place, scenario.kobuki.radius_m)
+    stage = Stage(floor, scenario.kobuki, scenario.lidar, scenario.shutter, start, for_stage)
     for phase in scenario.phases:
         yield from phase.play(stage)
+
+
+def _check_room(floor: Floor, place: SE2, radius_m: float) -> None:
+    room = floor.room_at(place.x, place.y)
+    if room < radius_m:
+        raise InputError(
+            expected=f"a place with {radius_m:g} m around it for the robot",
+            received=f"({place.x:.2f}, {place.y:.2f}) m, where there is {room:.2f} m",
+            remedy="choose a place in the free space of the map",
+        )

@@ -14,6 +14,7 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.sim.floor import Floor
 from firstfix.sim.lidar import Lidar
+from firstfix.sim.people import People
 from firstfix.sim.planner import Planner
 from firstfix.sim.robot import Kobuki, Robot
 from firstfix.sim.sweep import NOBODY, sweep
@@ -30,6 +31,13 @@ Command = Callable[[SE2], tuple[float, float]]
 """From where the robot is (``T_map_base``) to what it shall do: v (m/s) and w (rad/s)."""
 
 Event = LaserScan | Odometry | Signal
+
+
+class Shutter(Enum):
+    """When the beams of a scan are measured."""
+
+    AT_ONCE = "at once"
+    ROLLING = "rolling"  # one after another, while the sensor turns: motion skews the scan
 
 
 class Disturbance(Enum):
@@ -65,6 +73,11 @@ class Moment:
     phase: str
     disturbance: Disturbance | None = None
 
+    @property
+    def scan(self) -> LaserScan | None:
+        """The scan; None in a pause."""
+        return next((event for event in self.events if isinstance(event, LaserScan)), None)
+
 
 def at_rest(T_map_base: SE2) -> tuple[float, float]:
     """Command nothing, wherever the robot is."""
@@ -83,6 +96,8 @@ class Stage:
         The robot's kind.
     lidar : Lidar
         Its sensor.
+    shutter : Shutter
+        When the sensor measures its beams.
     T_map_base : SE2
         Where it stands at first.
     seed : numpy.random.SeedSequence
@@ -94,16 +109,19 @@ class Stage:
         floor: Floor,
         kobuki: Kobuki,
         lidar: Lidar,
+        shutter: Shutter,
         T_map_base: SE2,
         seed: np.random.SeedSequence,
     ) -> None:
         # Streams of their own: another noise of the sensor must not send the robot elsewhere.
-        wheels, beams, script = (np.random.default_rng(child) for child in seed.spawn(3))
+        wheels, beams, script, whims = (np.random.default_rng(child) for child in seed.spawn(4))
         self.floor = floor
         self.robot = Robot(kobuki, floor, T_map_base, wheels)
         self.planner = Planner(floor, kobuki.radius_m + _MARGIN_M)
+        self.people = People(floor, whims)
         self.rng = script
         self._lidar = lidar
+        self._shutter = shutter
         self._beams = beams
         self._ticks = 0
         self._disturbance: Disturbance | None = None
@@ -132,16 +150,41 @@ class Stage:
             What was reported.
         """
         stamp, T_map_base = self._stamp, self.robot.T_map_base
-        circles = np.column_stack([T_map_base.apply(hands[:, :2]), hands[:, 2]])
-        scan = sweep(self._lidar, self.floor, T_map_base, self._beams, stamp=stamp, circles=circles)
+        circles = np.concatenate(
+            [self.people.circles, np.column_stack([T_map_base.apply(hands[:, :2]), hands[:, 2]])]
+        )
         events: list[Event] = []
-        for step in range(_STEPS):
+        for _ in range(_STEPS):
             events.extend(self.robot.signals(self._stamp))
             events.append(Odometry(self._stamp, self.robot.T_odom_base))
-            if step == 0:
-                events.append(scan)
-            self.robot.drive(*command(self.robot.T_map_base), 1.0 / ODOMETRY_HZ)
-            self._ticks += 1
+            self._tick(command)
+        scan = sweep(
+            self._lidar,
+            self.floor,
+            T_map_base,
+            self._beams,
+            stamp=stamp,
+            circles=circles,
+            T_map_base_after=self.robot.T_map_base if self._shutter is Shutter.ROLLING else None,
+        )
+        # A scan has the stamp of its first beam, though it is complete only with its last.
+        beginning = sum(event.stamp == stamp for event in events)
+        events.insert(beginning, scan)
+        return self._end(stamp, events, T_map_base, phase)
+
+    def silence(self, phase: str) -> Moment:
+        """Go on as far, with nothing reported at all."""
+        stamp, T_map_base = self._stamp, self.robot.T_map_base
+        for _ in range(_STEPS):
+            self._tick(at_rest)
+        return self._end(stamp, [], T_map_base, phase)
+
+    def _tick(self, command: Command) -> None:
+        self.robot.drive(*command(self.robot.T_map_base), 1.0 / ODOMETRY_HZ)
+        self._ticks += 1
+
+    def _end(self, stamp: float, events: list[Event], T_map_base: SE2, phase: str) -> Moment:
+        self.people.walk(self.robot.T_map_base, PERIOD_S)
         disturbance, self._disturbance = self._disturbance, None
         return Moment(stamp, tuple(events), T_map_base, phase, disturbance)
 
