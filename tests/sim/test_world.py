@@ -7,11 +7,11 @@ from scipy import ndimage
 from firstfix.core.errors import InputError, MapError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
+from firstfix.sim.office import office
 from firstfix.sim.world import (
     ROOM_PITCH,
     WORLDS,
     identical_rooms,
-    office,
     random_free_pose,
     random_free_poses,
 )
@@ -25,26 +25,6 @@ def test_every_world_has_walls_between_free_and_unknown(name: str) -> None:
     assert grid.free_area > 50.0
     assert unknown.any()
     assert not (around_free & unknown).any()
-
-
-def test_every_room_of_the_office_can_be_reached() -> None:
-    _, rooms = ndimage.label(office().free)
-    assert rooms == 1
-
-
-def test_the_office_is_about_40_by_25_metres_at_5_cm() -> None:
-    grid = office()
-    rows, columns = np.nonzero(grid.occupied)
-    assert grid.resolution == 0.05
-    assert np.ptp(columns) * grid.resolution == pytest.approx(40.0, abs=0.5)
-    assert np.ptp(rows) * grid.resolution == pytest.approx(25.0, abs=0.5)
-
-
-@pytest.mark.parametrize("turns", [1, 2, 3])
-def test_the_office_does_not_repeat_itself_when_turned(turns: int) -> None:
-    free = office().free
-    turned = np.rot90(free, turns)
-    assert turned.shape != free.shape or np.mean(turned != free) > 0.05
 
 
 def test_identical_rooms_are_closed_and_alike_cell_by_cell() -> None:

@@ -108,11 +108,12 @@ class Wander(Phase):
 
     def play(self, stage: Stage) -> Iterator[Moment]:
         """Drive until time is over."""
-        left = periods(self.seconds)
-        while left > 0:
-            for moment in DriveTo(seconds=left * PERIOD_S).play(stage):
-                yield moment
-                left -= 1
+        end = stage.stamp + self.seconds - PERIOD_S / 2.0
+        while stage.stamp < end:
+            before = stage.stamp
+            yield from DriveTo(seconds=end - before).play(stage)
+            if stage.stamp == before:  # in a nook, where every goal is at hand
+                yield stage.moment("drive")
 
 
 @dataclass(frozen=True, slots=True)

@@ -91,10 +91,13 @@ class People:
                 x, y = T_map_base.x + person.wish[0], T_map_base.y + person.wish[1]
             else:
                 x, y = person.wish
+            before = math.hypot(x - person.x, y - person.y)
             self._step(person, x, y, person.pace * seconds)
-            if self._manner is Manner.WALK and math.hypot(x - person.x, y - person.y) < 0.05:
-                person.wish = self._next_goal(person, T_map_base)
             _make_way(person, T_map_base)
+            nearer = before - math.hypot(x - person.x, y - person.y)
+            # Who has arrived, or stands before a wall or the robot, changes their mind.
+            if self._manner is Manner.WALK and nearer < person.pace * seconds / 4.0:
+                person.wish = self._next_goal(person, T_map_base)
 
     def _comer(self, bearing: float, T_map_base: SE2) -> _Person | None:
         """Find a place in sight of the robot, in about this direction (rad) of the map."""

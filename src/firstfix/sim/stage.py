@@ -149,14 +149,14 @@ class Stage:
         Moment
             What was reported.
         """
-        stamp, T_map_base = self._stamp, self.robot.T_map_base
+        stamp, T_map_base = self.stamp, self.robot.T_map_base
         circles = np.concatenate(
             [self.people.circles, np.column_stack([T_map_base.apply(hands[:, :2]), hands[:, 2]])]
         )
         events: list[Event] = []
         for _ in range(_STEPS):
-            events.extend(self.robot.signals(self._stamp))
-            events.append(Odometry(self._stamp, self.robot.T_odom_base))
+            events.extend(self.robot.signals(self.stamp))
+            events.append(Odometry(self.stamp, self.robot.T_odom_base))
             self._tick(command)
         scan = sweep(
             self._lidar,
@@ -174,7 +174,7 @@ class Stage:
 
     def silence(self, phase: str) -> Moment:
         """Go on as far, with nothing reported at all."""
-        stamp, T_map_base = self._stamp, self.robot.T_map_base
+        stamp, T_map_base = self.stamp, self.robot.T_map_base
         for _ in range(_STEPS):
             self._tick(at_rest)
         return self._end(stamp, [], T_map_base, phase)
@@ -189,5 +189,6 @@ class Stage:
         return Moment(stamp, tuple(events), T_map_base, phase, disturbance)
 
     @property
-    def _stamp(self) -> float:
+    def stamp(self) -> float:
+        """The time, s."""
         return self._ticks / ODOMETRY_HZ
