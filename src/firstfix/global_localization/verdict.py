@@ -39,11 +39,30 @@ def place_probabilities(scores: NDArray[np.float64], beams: int) -> NDArray[np.f
     ndarray, shape (n,)
         Probability of each place; what is missing to 1 is that of a place that is not listed.
     """
-    costs = np.append(scores, _WRONG_MAP_COST) + _FLOOR
-    exponent = _EXPONENT * min(1.0, beams / _BEAMS_FOR_EXPONENT)
-    likelihoods: NDArray[np.float64] = (costs.min() / costs) ** exponent
+    logs = log_likelihoods(np.append(scores, _WRONG_MAP_COST), beams)
+    likelihoods: NDArray[np.float64] = np.exp(logs - logs.max())
     likelihoods /= likelihoods.sum()
     return likelihoods[:-1]
+
+
+def log_likelihoods(scores: NDArray[np.float64], beams: int) -> NDArray[np.float64]:
+    """Turn mean costs into log-likelihoods, up to a constant.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (n,)
+        Mean cost of a beam at each place, nats.
+    beams : int
+        Number of beams behind each mean.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Natural logarithms.
+    """
+    exponent = _EXPONENT * min(1.0, beams / _BEAMS_FOR_EXPONENT)
+    logs: NDArray[np.float64] = -exponent * np.log(scores + _FLOOR)
+    return logs
 
 
 def judge(

@@ -33,10 +33,11 @@ class WatchConfig:
         Up to where two poses are one place.
     look_again_m, look_again_rad : float
         Motion after which a further scan brings news about an ambiguous place.
-    won_mass : float
-        Share of the belief that a place must have to win without a UNIQUE scan.
+    won_probability : float
+        Probability that a place must have to win without a UNIQUE scan.
     won_looks : int
-        Looks in a row at which it must also be the best place of the whole map.
+        Looks that this takes at least; and looks in a row at which not even the best place fits,
+        after which all are given up.
 
     Raises
     ------
@@ -53,7 +54,7 @@ class WatchConfig:
     agree_rad: float = math.radians(15.0)
     look_again_m: float = 0.5
     look_again_rad: float = math.radians(30.0)
-    won_mass: float = 0.95
+    won_probability: float = 0.99
     won_looks: int = 3
 
     def __post_init__(self) -> None:

@@ -3,57 +3,95 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 from enum import Enum
 
-from firstfix.amcl.clusters import Cluster
+import numpy as np
+
 from firstfix.core.estimate import Hypothesis, LocateResult, Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.locate import Locator
+from firstfix.global_localization.verdict import log_likelihoods
 from firstfix.system.config import WatchConfig
 from firstfix.system.watch import same_place
 
-# A cluster with less of the belief than this is not there.
-_SOME_MASS = 0.01
-_LIKELY = 0.5
+# Two scans half a metre apart are half as good as two of different robots.
+_NEWS = 0.5
+# A place of the whole map that is less likely, against the best there, is no rival.
+_RIVAL_SHARE = 0.1
+_MOST_ENTRIES = 64
 
 
 class Standing(Enum):
-    """How the contest stands after a look."""
+    """How the contest stands."""
 
     OPEN = "open"
     WON = "won"
     LOST = "lost"
 
 
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A place in the contest: it moves with the odometry."""
+
+    T_map_odom: SE2
+    log_weight: float
+    place: Hypothesis
+
+
 class Contest:
-    """Watches a belief over several places; looks again only where a scan brings news.
+    """Follows all places that fit, without chance, and weighs them where a scan brings news.
+
+    A particle filter cannot do this: in places that look the same its mass wanders by chance, until
+    one of them has it all (docs/decisions/0011).
 
     Parameters
     ----------
+    places : tuple of Hypothesis
+        What the scan left open; at least one.
+    T_odom_base : SE2
+        Odometry at that scan.
     locator : Locator
         The static stage.
     config : WatchConfig
         Settings.
     """
 
-    def __init__(self, locator: Locator, config: WatchConfig) -> None:
+    def __init__(
+        self,
+        places: tuple[Hypothesis, ...],
+        T_odom_base: SE2,
+        locator: Locator,
+        config: WatchConfig,
+    ) -> None:
         self._locator = locator
         self._config = config
-        self._looked_at: SE2 | None = None
-        self._wins = 0
+        self._looked_at = T_odom_base
+        self._looks = 0
         self._misses = 0
-        self.result: LocateResult | None = None
+        self._entries = [
+            Entry(place.pose @ T_odom_base.inverse(), math.log(max(place.probability, 1e-9)), place)
+            for place in places
+        ]
 
-    def look(
-        self, scan: LaserScan, T_odom_base: SE2, clusters: tuple[Cluster, ...]
-    ) -> tuple[Standing, Hypothesis | None]:
-        """Compare the places of the belief with what the next scan says of the whole map.
+    @property
+    def places(self) -> tuple[Hypothesis, ...]:
+        """The places as of the last look, with their probabilities in the contest, best first."""
+        logs = np.array([entry.log_weight for entry in self._entries])
+        weights = np.exp(logs - logs.max())
+        shares = (weights / weights.sum()).tolist()
+        ranked = sorted(zip(shares, self._entries, strict=True), key=lambda pair: -pair[0])
+        return tuple(replace(entry.place, probability=share) for share, entry in ranked)
 
-        A place wins if a scan is UNIQUE there and the belief knows it, or if it has nearly all of
-        the belief and is the likeliest place of the map several times, each time seen from
-        somewhere else. A particle filter alone must not decide: its likelihoods are not independent
-        from scan to scan, and chance alone moves its mass between places that look the same.
+    def brings_news(self, T_odom_base: SE2) -> bool:
+        """Tell whether the robot has moved enough for a scan to say something new."""
+        moved = self._looked_at.inverse() @ T_odom_base
+        far = math.hypot(moved.x, moved.y) >= self._config.look_again_m
+        return far or abs(moved.yaw) >= self._config.look_again_rad
+
+    def look(self, scan: LaserScan, T_odom_base: SE2) -> Standing:
+        """Weigh the places by a scan, and ask whether the whole map has a better one.
 
         Parameters
         ----------
@@ -61,50 +99,73 @@ class Contest:
             The scan.
         T_odom_base : SE2
             Odometry at the scan.
-        clusters : tuple of Cluster
-            The belief, heaviest first, poses at the scan.
 
         Returns
         -------
-        tuple of Standing and (Hypothesis or None)
-            WON with the place; LOST if three looks in a row know of no place of the belief; else
-            OPEN.
+        Standing
+            WON if the scan is UNIQUE at one of the places, or if one has nearly all of the
+            probability after some looks, and fits; LOST if not even the best fits several times in
+            a row; else OPEN.
         """
-        if not self._brings_news(T_odom_base):
-            self.result = None
-            return Standing.OPEN, None
         self._looked_at = T_odom_base
-        self.result = self._locator.locate(scan)
-        best = self.result.best
-        if best is None or self.result.verdict is Verdict.NO_MATCH:
-            return Standing.OPEN, None
-        known = [
-            cluster
-            for cluster in clusters
-            if cluster.mass >= _SOME_MASS and same_place(cluster.pose, best.pose, self._config)
+        self._looks += 1
+        self._weigh(scan, T_odom_base)
+        result = self._locator.locate(scan)
+        if result.verdict is Verdict.UNIQUE and self._wins_outright(result.hypotheses[0]):
+            return Standing.WON
+        self._admit(result, T_odom_base)
+        best = self.places[0]
+        fits = best.score <= self._config.doubtful_cost
+        self._misses = 0 if fits else self._misses + 1
+        if self._misses >= self._config.won_looks:
+            return Standing.LOST
+        decided = best.probability >= self._config.won_probability
+        enough = self._looks >= self._config.won_looks
+        return Standing.WON if decided and fits and enough else Standing.OPEN
+
+    def _weigh(self, scan: LaserScan, T_odom_base: SE2) -> None:
+        """Multiply the weights of all places by what the scan says there, even of hopeless ones.
+
+        Who is dropped could not be told from a place that nobody has thought of yet.
+        """
+        poses = [entry.T_map_odom @ T_odom_base for entry in self._entries]
+        examined = self._locator.examine(scan, poses)
+        scores = np.array([place.score for place in examined])
+        logs = _NEWS * log_likelihoods(scores, examined[0].evidence.beams)
+        weighed = [
+            Entry(place.pose @ T_odom_base.inverse(), entry.log_weight + float(log), place)
+            for entry, place, log in zip(self._entries, examined, logs, strict=True)
         ]
-        if known and self.result.verdict is Verdict.UNIQUE:
-            return Standing.WON, best
-        top = bool(known) and known[0] is clusters[0]
-        likely = top and best.probability >= _LIKELY and known[0].mass >= self._config.won_mass
-        self._wins = self._wins + 1 if likely else 0
-        if self._wins >= self._config.won_looks:
-            return Standing.WON, best
-        listed = any(
-            same_place(cluster.pose, place.pose, self._config)
-            for cluster in clusters
-            for place in self.result.hypotheses
-        )
-        self._misses = 0 if listed and not self._is_unique_elsewhere() else self._misses + 1
-        return (Standing.LOST if self._misses >= self._config.won_looks else Standing.OPEN), None
+        weighed.sort(key=lambda entry: -entry.log_weight)
+        self._entries = []
+        for entry in weighed:
+            if self._known(entry.place) is None:
+                self._entries.append(entry)
 
-    def _is_unique_elsewhere(self) -> bool:
-        # A UNIQUE place that the belief knows would have won above.
-        return self.result is not None and self.result.verdict is Verdict.UNIQUE
+    def _wins_outright(self, place: Hypothesis) -> bool:
+        known = self._known(place)
+        if known is None:
+            return False
+        self._entries = [replace(known, place=place)]
+        return True
 
-    def _brings_news(self, T_odom_base: SE2) -> bool:
-        if self._looked_at is None:
-            return True
-        moved = self._looked_at.inverse() @ T_odom_base
-        far = math.hypot(moved.x, moved.y) >= self._config.look_again_m
-        return far or abs(moved.yaw) >= self._config.look_again_rad
+    def _admit(self, result: LocateResult, T_odom_base: SE2) -> None:
+        """Let in the places that the scan finds and that were not listed, as likely as it says."""
+        best = result.best
+        if best is None or result.verdict is Verdict.NO_MATCH:
+            return
+        most = max(entry.log_weight for entry in self._entries)
+        for place in result.hypotheses:
+            share = place.probability / best.probability
+            full = len(self._entries) >= _MOST_ENTRIES
+            if share >= _RIVAL_SHARE and not full and self._known(place) is None:
+                self._entries.append(
+                    Entry(place.pose @ T_odom_base.inverse(), most + math.log(share), place)
+                )
+
+    def _known(self, place: Hypothesis) -> Entry | None:
+        """Return the entry that is this place, if any."""
+        for entry in self._entries:
+            if same_place(entry.place.pose, place.pose, self._config):
+                return entry
+        return None

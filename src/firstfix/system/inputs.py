@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Odometry, Signal
 from firstfix.core.scan import LaserScan
@@ -29,9 +26,9 @@ class NewMap:
     grid: OccupancyGrid
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, slots=True)
 class PoseHint:
-    """A person says where the robot is.
+    """A person says where the robot is; good to about a metre and 40 degrees.
 
     Parameters
     ----------
@@ -39,13 +36,10 @@ class PoseHint:
         Time, s.
     T_map_base : SE2
         The pose.
-    covariance : ndarray, shape (3, 3)
-        Of x (m), y (m), yaw (rad) in the map frame.
     """
 
     stamp: float
     T_map_base: SE2
-    covariance: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

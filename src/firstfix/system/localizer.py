@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.amcl.clusters import Cluster
 from firstfix.amcl.filter import start
-from firstfix.amcl.initial import around_hypotheses, around_pose
+from firstfix.amcl.initial import around_pose
 from firstfix.amcl.particles import Particles
 from firstfix.amcl.sensor import build_sensor
 from firstfix.amcl.track import Track, Tracker
-from firstfix.core.estimate import Evidence, Hypothesis, LocateResult, Verdict
+from firstfix.core.estimate import Evidence, Hypothesis, Verdict
 from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
@@ -63,6 +62,7 @@ class Localizer:
         self._lifted: set[SignalKind] = set()
         self._found_nothing_at: tuple[float, SE2] | None = None
         self._update_asked = False
+        self._hint: SE2 | None = None
         self._track: Track | None = None
         self._locator: Locator
         self._tracker: Tracker
@@ -137,14 +137,10 @@ class Localizer:
         return [self._forget(given.stamp, Event.KIDNAPPED, reason)]
 
     def _take_hint(self, given: PoseHint) -> list[Output]:
-        last = self._odometry.last
-        if last is None:
-            return [Status(given.stamp, self.state, "a hint is of no use before odometry")]
-        n = self.config.amcl.max_particles
-        belief = around_pose(given.T_map_base, given.covariance, n, self._rng)
-        self._begin(belief, last.T_odom_base)
+        self._track = None
+        self._hint = given.T_map_base
         self.state = after(self.state, Event.PERSON_SAID)
-        return [Status(given.stamp, self.state, "a person says where; the next scans will tell")]
+        return [Status(given.stamp, self.state, "a person says where; the next scan will tell")]
 
     def _take_update_request(self, given: NoMotionUpdate) -> list[Output]:
         self._update_asked = True
@@ -183,23 +179,37 @@ class Localizer:
             return [Status(scan.stamp, self.state, result.reason, evidence)]
         if result.verdict is Verdict.UNIQUE:
             return self._arrive(scan, T_odom_base, best, Event.ONE_PLACE, result.reason)
-        n = self.config.amcl.max_particles
-        self._begin(around_hypotheses(result.hypotheses, n, self._rng), T_odom_base)
+        self._contest = Contest(result.hypotheses, T_odom_base, self._locator, self.config.watch)
         self.state = after(self.state, Event.SEVERAL_PLACES)
-        return self._tell_places(scan, result)
+        return self._tell_places(scan, result.reason)
 
     def _decide(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
-        track = self._move(scan, T_odom_base)
-        standing, place = self._contest.look(scan, T_odom_base, _carried(track, T_odom_base))
-        if standing is Standing.WON and place is not None:
-            reason = "one place has won, and the scan fits there"
-            return self._arrive(scan, T_odom_base, place, Event.PLACE_WON, reason)
+        if self._hint is not None:
+            return self._check_hint(scan, T_odom_base, self._hint)
+        if not (self._contest.brings_news(T_odom_base) or self._update_asked):
+            return []
+        self._update_asked = False
+        standing = self._contest.look(scan, T_odom_base)
+        best = self._contest.places[0]
+        if standing is Standing.WON:
+            reason = f"one place has won; {best.evidence.explained:.0%} of the beams fit there"
+            return self._arrive(scan, T_odom_base, best, Event.PLACE_WON, reason)
         if standing is Standing.LOST:
             reason = "the scans fit none of the places that were left: searching anew"
             return [self._forget(scan.stamp, Event.LOST, reason)]
-        if self._contest.result is None:
-            return []
-        return self._tell_places(scan, self._contest.result)
+        left = len(self._contest.places)
+        reason = f"{left} places left, the best at {best.probability:.0%}; motion would decide"
+        return self._tell_places(scan, reason)
+
+    def _check_hint(self, scan: LaserScan, T_odom_base: SE2, T_map_base: SE2) -> list[Output]:
+        self._hint = None
+        place = self._locator.locate_near(scan, T_map_base)
+        fit = f"{place.evidence.explained:.0%} of the beams fit"
+        if place.score <= self.config.watch.doubtful_cost:
+            reason = f"a person said where, and {fit} there"
+            return self._arrive(scan, T_odom_base, place, Event.PLACE_WON, reason)
+        reason = f"a person said where, but only {fit} anywhere near: searching"
+        return [self._forget(scan.stamp, Event.LOST, reason, place.evidence)]
 
     def _follow(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
         track = self._move(scan, T_odom_base)
@@ -247,7 +257,6 @@ class Localizer:
     def _begin(self, belief: Particles, T_odom_base: SE2) -> None:
         self._track = Track(start(belief), T_odom_base)
         self._watch = Watch(self._locator, self.config.watch)
-        self._contest = Contest(self._locator, self.config.watch)
 
     def _move(self, scan: LaserScan, T_odom_base: SE2) -> Track:
         assert self._track is not None  # noqa: S101 - the states that follow have one
@@ -260,20 +269,24 @@ class Localizer:
         self, stamp: float, event: Event, reason: str, evidence: Evidence | None = None
     ) -> Status:
         self._track = None
+        self._hint = None
         self._waiting = None
         self.state = after(self.state, event)
         return Status(stamp, self.state, reason, evidence)
 
-    def _tell_places(self, scan: LaserScan, result: LocateResult) -> list[Output]:
+    def _tell_places(self, scan: LaserScan, reason: str) -> list[Output]:
+        places = self._contest.places
+        motion = deciding_motion(scan, places, self._locator.fields.grid)
         outputs: list[Output] = [
-            Hypotheses(scan.stamp, result.hypotheses),
-            Status(scan.stamp, self.state, result.reason),
+            Hypotheses(scan.stamp, places),
+            Status(scan.stamp, self.state, reason, places[0].evidence),
         ]
-        motion = deciding_motion(scan, result.hypotheses, self._locator.fields.grid)
         return [*outputs, motion] if motion is not None else outputs
 
     def _follow_jump(self, before: Odometry | None, now: Odometry) -> None:
         """Go on at the same pose in a new odometry frame; the next scan will tell whether."""
+        if self.state is State.TRACKING and self._hint is None:
+            self.state = after(self.state, Event.LOST)  # places that moved with the old frame
         if self._track is None or before is None:
             return
         T_map_base = self._track.T_map_odom @ before.T_odom_base
@@ -281,18 +294,8 @@ class Localizer:
         # Odometry that would have brought the track here, had its frame always been the new one.
         self._track = Track(self._track.state, now.T_odom_base @ T_before_now.inverse())
         self._watch = Watch(self._locator, self.config.watch)
-        self._contest = Contest(self._locator, self.config.watch)
 
     @staticmethod
     def _no_injection(_: LaserScan, __: int, ___: np.random.Generator) -> NDArray[np.float64]:
         """Nothing: what augmented recovery guesses at random, the watch finds by search."""
         return np.empty((0, 3))
-
-
-def _carried(track: Track, T_odom_base: SE2) -> tuple[Cluster, ...]:
-    """Return the places of a belief at the scan, heaviest first."""
-    increment = track.T_odom_base.inverse() @ T_odom_base
-    return tuple(
-        Cluster(cluster.mass, cluster.pose @ increment, cluster.covariance)
-        for cluster in track.state.clusters
-    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -12,8 +13,17 @@ from firstfix.core.se2 import SE2
 from firstfix.global_localization.locate import Locator
 from firstfix.system.config import WatchConfig
 
-# A place nearby must fit so much better that it is not the same fit, a little refined.
+# Another place must fit so much better that it is not the same fit, a little refined.
 _BETTER = 0.75
+
+# A robot that only slipped sees what it saw before, so the place nearby fits as well as the track
+# used to, or nearly. Rooms that look somewhat alike do not.
+_AS_USUAL = 1.5
+_USUAL_RATE = 0.1
+_GOOD_COST = 0.3
+# Farther off it may as well be another place that looks the same: the whole map must be asked.
+_SLIP_M = 0.7
+_SLIP_RAD = math.radians(30.0)
 
 
 class Finding(Enum):
@@ -66,6 +76,7 @@ class Watch:
         self._contradicted_since: float | None = None
         self._candidate: Candidate | None = None
         self._searched_at: float | None = None
+        self._usual_cost = _GOOD_COST
 
     def look(self, scan: LaserScan, T_odom_base: SE2, T_map_base: SE2) -> Look:
         """Judge the tracked pose by a scan; in doubt look nearby, then everywhere.
@@ -87,6 +98,7 @@ class Watch:
         (tracked,) = self._locator.examine(scan, [T_map_base])
         if tracked.score <= self._config.doubtful_cost:
             self._calm_down()
+            self._usual_cost += _USUAL_RATE * (tracked.score - self._usual_cost)
             return Look(Finding.FITS, tracked)
         place = self._better_place(scan, tracked, T_map_base)
         if place is not None and self._confirmed(place, T_odom_base):
@@ -104,7 +116,10 @@ class Watch:
         self, scan: LaserScan, tracked: Hypothesis, T_map_base: SE2
     ) -> Hypothesis | None:
         near = self._locator.locate_near(scan, T_map_base)
-        if near.score <= min(self._config.doubtful_cost, _BETTER * tracked.score):
+        as_usual = max(_GOOD_COST, _AS_USUAL * self._usual_cost)
+        fits = near.score <= min(as_usual, self._config.doubtful_cost, _BETTER * tracked.score)
+        off = T_map_base.inverse() @ near.pose
+        if fits and math.hypot(off.x, off.y) <= _SLIP_M and abs(off.yaw) <= _SLIP_RAD:
             return near
         if self._searched_at is not None:
             waited = scan.stamp - self._searched_at

@@ -1,0 +1,76 @@
+"""Playing the story of `firstfix demo`: a simulated robot, and the localizer that follows it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.odometry import Signal
+from firstfix.evaluation.story import Scene
+from firstfix.sim.mishaps import CarryTo, Teleport
+from firstfix.sim.phases import DriveTo, Stand
+from firstfix.sim.scenario import Scenario, run
+from firstfix.system.inputs import NewMap
+from firstfix.system.localizer import Localizer
+from firstfix.system.outputs import InitialPose, Output, Status, TrackedPose
+
+# A robot wakes, drives to two goals, is picked up and carried, drives on, and is somewhere else
+# all of a sudden without that a wheel or a switch would have told.
+SCRIPT = (
+    Stand(2.0),
+    DriveTo(),
+    DriveTo(),
+    CarryTo(seconds=4.0),
+    Stand(3.0),
+    DriveTo(),
+    Teleport(),
+    Stand(3.0),
+    DriveTo(),
+)
+
+
+def play(grid: OccupancyGrid, seed: int, localizer: Localizer) -> Iterator[Scene]:
+    """Play the script in a building and hand all that the robot reports to a localizer.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The building, and the map of it.
+    seed : int
+        Another seed, another story.
+    localizer : Localizer
+        New; it gets the map first.
+
+    Yields
+    ------
+    Scene
+        One a scan.
+    """
+    localizer.handle(NewMap(0.0, grid))
+    act, lifted = 0, False
+    for moment in run(Scenario(SCRIPT), grid, seed):
+        began = time.process_time()
+        outputs: list[Output] = []
+        for event in moment.events:
+            outputs += localizer.handle(event)
+            if isinstance(event, Signal):
+                lifted = event.active
+                act += event.active  # carried: the act begins where the wheels lose the ground
+        cpu_s = time.process_time() - began
+        if moment.disturbance is not None and "TELEPORTED" in moment.disturbance.name:
+            act += 1
+        tracked = [output for output in outputs if isinstance(output, TrackedPose)]
+        found = [output for output in outputs if isinstance(output, InitialPose)]
+        told = [output for output in outputs if isinstance(output, Status)]
+        yield Scene(
+            stamp=moment.stamp,
+            truth=moment.T_map_base,
+            published=tracked[-1].T_map_base if tracked else None,
+            initial=found[-1].T_map_base if found else None,
+            state=localizer.state.value,
+            reason=told[-1].reason if told else "",
+            act=act,
+            lifted=lifted,
+            cpu_s=cpu_s,
+        )
