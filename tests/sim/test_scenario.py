@@ -6,11 +6,13 @@ import math
 import numpy as np
 import pytest
 
+from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.sim.drawing import Drawing
+from firstfix.sim.lidar import Lidar
 from firstfix.sim.phases import CarryTo, DriveTo, Stand, Teleport
 from firstfix.sim.scenario import Scenario, run
 from firstfix.sim.stage import Disturbance, Moment
@@ -38,6 +40,10 @@ def flat() -> OccupancyGrid:
 @pytest.fixture(scope="module")
 def story(flat: OccupancyGrid) -> list[Moment]:
     return list(run(Scenario(EVERYTHING, start=SE2(1.0, 1.0, 0.5)), flat, seed=1))
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
 
 
 def told(story: list[Moment]) -> list[object]:
@@ -110,3 +116,30 @@ def test_a_scan_says_where_the_sensor_sits(story: list[Moment]) -> None:
     assert scan.T_base_laser == SE2(0.07, 0.0, 0.0)
     assert len(scan) == 360
     assert math.isclose(scan.angle_increment, math.radians(1.0))
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        Scenario([Stand(0.1)], start=SE2(0.15, 1.0, 0.0)),
+        Scenario([Stand(0.1), Teleport(SE2(3.0, 1.0, 0.0))], start=SE2(1.0, 1.0, 0.0)),
+        Scenario([CarryTo(SE2(70.0, 1.0, 0.0))], start=SE2(1.0, 1.0, 0.0)),
+    ],
+)
+def test_a_robot_is_not_put_into_a_wall(flat: OccupancyGrid, script: Scenario) -> None:
+    with pytest.raises(InputError, match="around it for the robot"):
+        next(run(script, flat, seed=1))
+
+
+def test_furniture_is_seen_though_no_map_has_it(flat: OccupancyGrid) -> None:
+    start = SE2(1.0, 1.0, 0.0)
+    exact = Lidar(sigma_m=0.0)
+    bare, full = (
+        next(run(Scenario([Stand(0.1)], start, lidar=exact, furniture=n), flat, seed=1)).scan
+        for n in (0, 3)
+    )
+    assert bare is not None
+    assert full is not None
+    np.testing.assert_array_equal(bare.ranges, exact.scan(flat, start, rng()).ranges)
+    assert (full.ranges <= bare.ranges).all()
+    assert (full.ranges < bare.ranges - 0.1).any()

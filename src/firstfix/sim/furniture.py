@@ -13,6 +13,7 @@ from firstfix.core.se2 import SE2
 from firstfix.sim.floor import Floor
 
 _SIDES_M = (0.3, 0.9)
+_TRIES = 50
 _PASSAGE_M = 0.5  # left free all around a piece: it blocks a view, never a way
 
 
@@ -44,7 +45,9 @@ def furnished(
         length, width = rng.uniform(*_SIDES_M, 2).tolist()
         half = math.hypot(length, width) / 2.0
         places = np.flatnonzero(room > half + _PASSAGE_M)
-        for index in rng.permutation(places)[:50].tolist():
+        if len(places) == 0:
+            continue
+        for index in rng.choice(places, _TRIES).tolist():
             row, column = divmod(index, grid.width)
             x, y = grid.to_map(np.array([column + 0.5, row + 0.5])).tolist()
             if all(math.hypot(x - a, y - b) > half + r + _PASSAGE_M for a, b, r in taken):
