@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from firstfix.cli.bench_kidnap import PANEL as KIDNAP_PANEL
+from firstfix.cli.bench_kidnap import MoreCases, Scenarios, Worlds, bench_kidnap
 from firstfix.cli.bench_track import PANEL, Params, Seed, bench_track
 from firstfix.cli.progress import progress
 from firstfix.cli.targets import check_file, check_folder, check_plots, write_json
@@ -20,12 +22,13 @@ if TYPE_CHECKING:
 
 def bench(
     cases: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Argument(
             metavar="CASES...",
             help="Folders with map.yaml, scans.npz and meta.json, or folders of such folders.",
+            show_default=False,
         ),
-    ],
+    ] = None,
     method: Annotated[
         list[Method] | None,
         typer.Option(help="Which method; may be given several times.", show_default="fast"),
@@ -54,6 +57,17 @@ def bench(
     ] = False,
     params: Params = None,
     seed: Seed = None,
+    kidnapped: Annotated[
+        bool,
+        typer.Option(
+            "--kidnap",
+            help="Kidnap simulated robots, and with cases recorded ones, instead.",
+            rich_help_panel=KIDNAP_PANEL,
+        ),
+    ] = False,
+    scenarios: Scenarios = None,
+    worlds: Worlds = None,
+    more_cases: MoreCases = None,
 ) -> None:
     """Locate every scan of every case and compare with the truth.
 
@@ -61,16 +75,39 @@ def bench(
     process that does nothing else. The totals 'total' and 'foreign' of the JSON are those of
     the first --method; 'totals' has one for each.
     """
+    cases = [*(cases or []), *(more_cases or [])]
+    of_locating = {"--method": method, "--foreign": foreign, "--limit": limit}
+    of_kidnapping = {"--kidnap": kidnapped, "--scenarios": scenarios, "--worlds": worlds}
     if tracked:
-        _check_tracking(method, report, foreign, limit)
+        _refuse("--track", {"--report": report, **of_locating, **of_kidnapping})
+        _check_cases(cases)
         bench_track(cases, json_file, jobs, params, seed)
         return
+    if kidnapped:
+        _refuse("--kidnap", {"--params": params, **of_locating})
+        bench_kidnap(
+            cases,
+            worlds,
+            scenarios=scenarios,
+            seed=seed or 0,
+            jobs=jobs,
+            json_file=json_file,
+            report=report,
+        )
+        return
+    if scenarios is not None or worlds is not None:
+        raise InputError(
+            expected="--scenarios and --worlds with --kidnap",
+            received="one of them without it",
+            remedy="add --kidnap, or leave them out",
+        )
     if params is not None or seed is not None:
         raise InputError(
-            expected="--params and --seed with --track",
-            received="one of them without it",
+            expected="--params and --seed with --track, or --seed with --kidnap",
+            received="one of them without",
             remedy="add --track, or leave them out: locating has no chance in it",
         )
+    _check_cases(cases)
     from firstfix.cli.cases import find_cases
     from firstfix.evaluation import bench as runner
     from firstfix.evaluation.document import bench_document
@@ -114,14 +151,21 @@ def _check_targets(json_file: Path | None, report: Path | None) -> None:
         check_folder(report)
 
 
-def _check_tracking(
-    method: list[Method] | None, report: Path | None, foreign: bool, limit: int
-) -> None:
-    options = (("--method", method), ("--report", report), ("--foreign", foreign))
-    wrong = [name for name, value in (*options, ("--limit", limit)) if value]
+def _check_cases(cases: list[Path]) -> None:
+    if not cases:
+        raise InputError(
+            expected="CASES: at least one folder of a case, or of cases",
+            received="none",
+            remedy="name one; only --kidnap can do without",
+        )
+
+
+def _refuse(measure: str, options: dict[str, object]) -> None:
+    """Refuse options that were given although they are not about what is measured."""
+    wrong = [name for name, value in options.items() if value]
     if wrong:
         raise InputError(
-            expected="--track with --json, --jobs, --params and --seed only",
-            received=f"--track with {', '.join(wrong)}",
-            remedy="leave it out: the other options are about locating",
+            expected=f"{measure} without options of other benchmarks",
+            received=f"{measure} with {', '.join(wrong)}",
+            remedy="leave it out: it is not about this",
         )

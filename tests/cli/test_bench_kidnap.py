@@ -1,0 +1,132 @@
+"""``firstfix bench --kidnap``."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from firstfix.cli import kidnap_scripts
+from firstfix.cli.kidnap_play import CaseTask, simulated, watched
+from firstfix.cli.kidnap_scripts import scripted
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.recording import Recording
+from firstfix.evaluation.case import Case
+from firstfix.evaluation.kidnap import judge_trial
+from firstfix.sim.phases import CarryTo, DriveTo, Phase, Slip, Stand, Teleport
+from firstfix.sim.recorded import record
+from firstfix.sim.scenario import Scenario, run
+
+KINDS = ["teleport", "carry", "teleport_driving", "crowd_teleport", "slip", "crowd", "nothing"]
+
+
+def test_kinds_take_turns_and_begin_with_standing() -> None:
+    scripts = [scripted(seed) for seed in range(14)]
+    assert [kind for kind, _ in scripts] == 2 * KINDS
+    assert all(isinstance(phases[0], Stand) for _, phases in scripts)
+
+
+def test_every_disturbance_has_time_after_it() -> None:
+    for seed in range(7):
+        _, phases = scripted(seed)
+        for i, phase in enumerate(phases):
+            if isinstance(phase, Teleport | CarryTo | Slip):
+                rest = phases[i + 1 :]
+                ends = [j for j, p in enumerate(rest) if isinstance(p, Teleport | CarryTo | Slip)]
+                calm = rest[: ends[0]] if ends else rest
+                assert sum(getattr(p, "seconds", 0.0) for p in calm) >= kidnap_scripts.AFTER_S
+
+
+def test_a_world_is_played_and_told(cli, tmp_path: Path) -> None:
+    arguments = ["--worlds", "house", "--scenarios", 2, "--seed", 5, "--jobs", 2]
+    ended = cli("bench", "--kidnap", *arguments, "--json", "k.json", "--report", "out")
+    assert ended.status == 0, ended
+    assert ended.out.startswith("| world ")
+    assert "| crowd " in ended.out
+    document = json.loads((tmp_path / "k.json").read_text())
+    (row,) = document["worlds"]
+    assert (row["name"], row["scenarios"], row["kidnaps"]) == ("house", 2, 0)
+    assert list(row["by_kind"]) == ["crowd", "nothing"]
+    assert row["start_right"] + row["start_wrong"] <= 2
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "report.md",
+        "time_to_recover.png",
+    }
+
+
+@pytest.fixture(scope="module")
+def story(hall_plan: OccupancyGrid) -> list[Phase]:
+    done = [CarryTo(seconds=1.0), Stand(12.0), Slip(), Stand(1.0), Teleport(), Stand(12.0)]
+    return [Stand(1.0), *done]
+
+
+def test_what_happens_to_a_robot_reaches_the_judgement(
+    hall_plan: OccupancyGrid, story: list[Phase]
+) -> None:
+    moments = run(Scenario(story), hall_plan, 1)
+    instants = list(watched(simulated(moments), hall_plan))
+    trial = judge_trial(instants)
+    assert [a.kind for a in trial.aftermaths] == ["carry", "slip", "teleport"]
+    carry, _, teleport = trial.aftermaths
+    assert (carry.signalled, teleport.signalled) == (True, False)
+    assert (carry.is_kidnap, teleport.is_kidnap) == (True, True)
+    assert carry.left_after_s == 0.0
+    assert carry.stamp == pytest.approx(2.0)
+    held = [instant for instant in instants if 1.0 <= instant.stamp < 1.95]
+    assert all(i.disturbed and not i.useful and i.published is None for i in held)
+    assert all(instant.cpu_s >= 0.0 and instant.truth is not None for instant in instants)
+
+
+def test_a_spliced_drive_is_a_story_of_unsignalled_kidnaps(hall_plan: OccupancyGrid) -> None:
+    recording = record(run(Scenario([DriveTo(seconds=15.0), DriveTo()] * 4), hall_plan, 2))
+    thin = Recording(recording.scans[::4], recording.odometry, _rows(recording.truth))
+    case = Case("hall", "hall", "sim", lambda: hall_plan, lambda: thin)
+    played = CaseTask(case, (0,))()
+    assert (played.name, played.left_out) == ("hall", None)
+    (ran,) = played.runs
+    assert (ran.kind, ran.seed) == ("splice", 0)
+    assert [a.kind for a in ran.trial.aftermaths] == ["splice"] * 4
+    assert all(a.is_kidnap and not a.signalled for a in ran.trial.aftermaths)
+
+
+def _rows(truth: np.ndarray | None) -> np.ndarray | None:
+    return None if truth is None else truth[::4]
+
+
+def test_cases_that_cannot_be_spliced_are_named(cli, drive: Path, cases: Path) -> None:
+    ended = cli("bench", drive, "--kidnap", "--cases", cases / "unique", "--jobs", 2)
+    assert (ended.status, ended.out) == (2, "")
+    assert "drive (no drive of 20 s" in ended.err
+    assert "unique (no odometry)" in ended.err
+    assert ended.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (["--kidnap", "--foreign"], "--foreign"),
+        (["--kidnap", "--method", "paper"], "--method"),
+        (["--kidnap", "--limit", "3"], "--limit"),
+        (["--kidnap", "--params", "amcl.yaml"], "--params"),
+        (["--kidnap", "--worlds", "office,moon"], "'moon'"),
+        (["--kidnap", "--worlds", ""], "''"),
+        (["--kidnap", "--cases", "nowhere"], "nowhere"),
+        (["--kidnap", "--worlds", "house", "--json", "file/b.json"], "file/b.json"),
+        (["--kidnap", "--worlds", "house", "--report", "file/out"], "file/out"),
+        (["--scenarios", "3"], "--kidnap"),
+        (["--worlds", "office"], "--kidnap"),
+        (["--track", "--kidnap"], "--kidnap"),
+        (["--track", "--scenarios", "3"], "--scenarios"),
+        (["--track"], "CASES"),
+        ([], "CASES"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(
+    cli, tmp_path: Path, options: list[str], word: str
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    ended = cli("bench", *options)
+    assert (ended.status, ended.out) == (2, "")
+    assert ended.err.startswith("firstfix: expected ")
+    assert ended.err.count("\n") == 1
+    assert word in ended.err
