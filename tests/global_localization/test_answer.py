@@ -20,6 +20,7 @@ from firstfix.global_localization.answer import (
     check_positions,
     check_searchable,
     nothing_to_match,
+    to_cells,
     to_map,
 )
 
@@ -51,6 +52,23 @@ def test_the_sensor_stands_where_it_was_found(T_map_grid, T_base_laser, pose, re
         grid.to_cells(np.array([T_map_laser.x, T_map_laser.y])), pose[:2], atol=1e-6
     )
     assert abs(wrap(T_map_laser.yaw - T_map_grid.yaw - pose[2])) < 1e-9
+
+
+@given(poses, poses, in_cells, resolutions)
+def test_into_cells_is_the_way_back(T_map_grid, T_base_laser, pose, resolution):
+    grid, scan = grid_at(T_map_grid, resolution), scan_from(T_base_laser)
+    T_map_base, _ = to_map(grid, scan, np.array(pose), np.eye(3))
+    back = to_cells(grid, scan, T_map_base)
+    np.testing.assert_allclose(back[:2], pose[:2], atol=1e-6)
+    assert abs(wrap(back[2] - pose[2])) < 1e-9
+
+
+@given(poses, poses, poses, resolutions)
+def test_out_of_cells_is_the_way_back(T_map_grid, T_base_laser, T_map_base, resolution):
+    grid, scan = grid_at(T_map_grid, resolution), scan_from(T_base_laser)
+    back, _ = to_map(grid, scan, to_cells(grid, scan, T_map_base), np.eye(3))
+    assert back.distance_to(T_map_base) < 1e-9
+    assert abs(wrap(back.yaw - T_map_base.yaw)) < 1e-9
 
 
 @given(poses, poses, in_cells, resolutions, st.integers(0, 1000))
