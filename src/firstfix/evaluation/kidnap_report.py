@@ -86,7 +86,7 @@ def save_recovery_curves(runs: Sequence[KidnapRun], path: Path) -> Path:
     axes.set(xlabel="time after the first useful scan, s", ylabel="share of kidnaps recovered")
     axes.grid(which="both", alpha=0.25)
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="lower right", title="world (kidnaps)")
+        figure.legend(loc="outside right upper", title="world (kidnaps)", fontsize="small")
     return save_figure(figure, path)
 
 
