@@ -209,7 +209,7 @@ def test_a_log_without_truth_needs_a_start(
     cli, files: tuple[Path, Path], drive: Path, tmp_path: Path
 ) -> None:
     log = changed(drive, tmp_path, true_pose=None)
-    assert_one_line(cli("track", files[0], log), "firstfix locate", "--start X,Y,YAW")
+    assert_one_line(cli("track", files[0], log), "--start search", "--start X,Y,YAW")
     assert_one_line(cli("track", files[0], log, "--start", "truth"), "true poses")
 
 
@@ -288,3 +288,22 @@ def test_a_simulated_case_is_kept_to_its_end(cli, shared: Path) -> None:
     document = strict_json(cli("track", case / "map.yaml", case / "scans.npz", "--json").out)
     assert document["kept"] == 1.0
     assert document["ape"]["rmse_m"] < 0.05
+
+
+def test_a_search_needs_no_start(cli, files: tuple[Path, Path]) -> None:
+    ended = cli("track", *files, "--start", "search", "--json", "--out", "found.tum")
+    assert ended.status == 0, ended
+    document = strict_json(ended.out)
+    assert document["start"]["origin"] == "search"
+    assert document["kept"] == 1.0
+    assert "found after 0.0 s" in ended.err
+    assert len(load_tum(Path("found.tum"))) == document["scans"]
+
+
+def test_a_search_that_finds_nothing_says_why(
+    cli, files: tuple[Path, Path], alike: tuple[Path, Path]
+) -> None:
+    ended = cli("track", alike[0], files[1], "--start", "search", "--out", "never.tum")
+    assert ended.status == 1
+    assert "found at none of" in ended.out
+    assert not Path("never.tum").exists()

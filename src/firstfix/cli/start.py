@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from firstfix.core.recording import Recording
 
 TRUTH = "truth"
-WAYS = f"X,Y,YAW (m, m, rad), {TRUTH}, or the file of a saved pose"
+SEARCH = "search"
+WAYS = f"X,Y,YAW (m, m, rad), {SEARCH}, {TRUTH}, or the file of a saved pose"
 
 
 class Origin(Enum):
@@ -29,6 +30,7 @@ class Origin(Enum):
     SAVED = "saved"
     PARAMETERS = "parameters"
     TRUTH = "truth"
+    SEARCH = "search"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +42,7 @@ class Start:
     origin : Origin
         Whose word it is.
     T_map_base : SE2 or None
-        The pose at the first scan that has odometry; None for the first true pose.
+        The pose at the first scan that has odometry; None for the first true pose, or the search.
     covariance : ndarray, shape (3, 3)
         How sure that is: x (m), y (m), yaw (rad).
     note : str
@@ -59,19 +61,19 @@ def read_start(text: str | None) -> SE2 | Path | str | None:
     Parameters
     ----------
     text : str or None
-        ``X,Y,YAW``, ``truth``, the name of a file, or None where nothing was said.
+        ``X,Y,YAW``, ``search``, ``truth``, the name of a file, or None where nothing was said.
 
     Returns
     -------
     SE2, Path, str or None
-        The pose, the file, `TRUTH`, or None.
+        The pose, the file, `SEARCH`, `TRUTH`, or None.
 
     Raises
     ------
     InputError
         If it is none of these.
     """
-    if text is None or text == TRUTH:
+    if text is None or text in (TRUTH, SEARCH):
         return text
     if Path(text).is_file():
         return Path(text)
@@ -112,9 +114,11 @@ def choose_start(
     InputError
         If nobody knows where to begin, a saved pose must not be used, or it is outside the map.
     """
-    from firstfix.evaluation.track import GIVEN_START, check_start
+    from firstfix.evaluation.track import GIVEN_START, TRUE_START, check_start
 
-    if isinstance(said, Path):
+    if said == SEARCH:
+        start = Start(Origin.SEARCH, None, TRUE_START, "searching the whole map")
+    elif isinstance(said, Path):
         start = _saved(said, grid, recording)
     elif isinstance(said, SE2):
         start = Start(Origin.GIVEN, said, GIVEN_START, "starting at the pose given")
@@ -147,8 +151,8 @@ def _true(recording: Recording, *, is_asked_for: bool) -> Start:
         raise InputError(
             expected="a log that knows true poses" if is_asked_for else "a pose to start at",
             received="a log that knows none" if is_asked_for else "none, and a log without truth",
-            remedy="run `firstfix locate --json` on the same map and log, and give its `pose`: "
-            "--start X,Y,YAW in metres and radians",
+            remedy="let it be found by --start search, or give it by --start X,Y,YAW in metres and "
+            "radians",
         )
     return Start(Origin.TRUTH, None, TRUE_START, "starting at the first true pose of the log")
 

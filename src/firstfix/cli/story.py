@@ -7,10 +7,12 @@ from collections.abc import Iterator
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Signal
+from firstfix.evaluation.small_room import small_room
 from firstfix.evaluation.story import Scene
 from firstfix.sim.mishaps import CarryTo, Teleport
 from firstfix.sim.phases import DriveTo, Stand
 from firstfix.sim.scenario import Scenario, run
+from firstfix.sim.stage import Disturbance
 from firstfix.system.inputs import NewMap
 from firstfix.system.localizer import Localizer
 from firstfix.system.outputs import InitialPose, Output, Status, TrackedPose
@@ -28,6 +30,12 @@ SCRIPT = (
     Stand(3.0),
     DriveTo(),
 )
+
+
+def warm_up() -> None:
+    """Load or compile all kernels that a story needs, by a short one in a small room."""
+    for _ in play(small_room(), 0, Localizer()):
+        pass
 
 
 def play(grid: OccupancyGrid, seed: int, localizer: Localizer) -> Iterator[Scene]:
@@ -55,10 +63,11 @@ def play(grid: OccupancyGrid, seed: int, localizer: Localizer) -> Iterator[Scene
         for event in moment.events:
             outputs += localizer.handle(event)
             if isinstance(event, Signal):
+                # Carried: the act begins where the first wheel loses the ground.
+                act += event.active and not lifted
                 lifted = event.active
-                act += event.active  # carried: the act begins where the wheels lose the ground
         cpu_s = time.process_time() - began
-        if moment.disturbance is not None and "TELEPORTED" in moment.disturbance.name:
+        if moment.disturbance is Disturbance.TELEPORTED:
             act += 1
         tracked = [output for output in outputs if isinstance(output, TrackedPose)]
         found = [output for output in outputs if isinstance(output, InitialPose)]

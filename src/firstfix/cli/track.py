@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from firstfix.cli.progress import progress, working
 from firstfix.cli.settings import load_config, seed_of
-from firstfix.cli.start import WAYS, choose_start, map_key, read_start
+from firstfix.cli.start import WAYS, Origin, choose_start, map_key, read_start
 from firstfix.cli.targets import check_file, check_picture
+
+if TYPE_CHECKING:
+    from firstfix.amcl.config import AmclConfig
+    from firstfix.core.grid import OccupancyGrid
+    from firstfix.core.recording import Recording
+    from firstfix.evaluation.drive import Drive
+    from firstfix.evaluation.track import TrackedScan
+
+NO_ANSWER = 1
 
 
 def track(
@@ -52,8 +61,8 @@ def track(
         typer.Option(
             "--save-pose",
             metavar="FILE",
-            help="Keep the last pose in a file, at save_pose_rate of the log's time and at the "
-            "end, for --start.",
+            help="Keep the last pose in a file, at save_pose_rate of the log's time (not where it "
+            "is searched) and at the end, for --start.",
         ),
     ] = None,
     seed: Annotated[
@@ -63,7 +72,10 @@ def track(
         ),
     ] = None,
 ) -> None:
-    """Follow the robot through a log, from a known start.
+    """Follow the robot through a log, from a known start or, with --start search, from anywhere.
+
+    Searching also checks every pose, and finds the robot again where it was carried away; exit
+    status 1 if it is never found.
 
     Where the log knows the truth, the track is compared with it. Poses are those of the base in the
     map.
@@ -87,26 +99,30 @@ def track(
 
     known_odometry(recording)  # without it, no start would help
     begin = choose_start(said, grid, recording, config)
-    drive = plan_drive(recording, begin.T_map_base)
-    check_start(grid, drive.begin_at)
-    for note in (*recording.notes, begin.note, *drive.notes):
+    for note in (*recording.notes, begin.note):
         typer.echo(f"note: {note}", err=True)
+    keeper = None
+    if keep_pose is not None:
+        from firstfix.cli.pose_keeper import PoseKeeper
 
-    with working("preparing the map"):
-        tracker = make_tracker(grid, config)
-        keeper = None
-        if keep_pose is not None:
-            from firstfix.cli.pose_keeper import PoseKeeper
-
-            keeper = PoseKeeper(keep_pose, map_key(grid), config.save_pose_rate)
-    rng = np.random.default_rng(seed_of(config, seed))
-    tracked = []
-    with progress(len(drive.sights), "tracking") as done:
-        for scan in follow_drive(drive, tracker, config, begin.covariance, rng):
-            tracked.append(scan)
-            if keeper is not None:
-                keeper.offer(scan)
-            done(f"{scan.particles} particles")
+        keeper = PoseKeeper(keep_pose, map_key(grid), config.save_pose_rate)
+    if begin.origin is Origin.SEARCH:
+        drive, tracked = _searched(recording, grid, config)
+    else:
+        drive = plan_drive(recording, begin.T_map_base)
+        check_start(grid, drive.begin_at)
+        with working("preparing the map"):
+            tracker = make_tracker(grid, config)
+        rng = np.random.default_rng(seed_of(config, seed))
+        tracked = []
+        with progress(len(drive.sights), "tracking") as done:
+            for scan in follow_drive(drive, tracker, config, begin.covariance, rng):
+                tracked.append(scan)
+                if keeper is not None:
+                    keeper.offer(scan)
+                done(f"{scan.particles} particles")
+    for note in drive.notes:
+        typer.echo(f"note: {note}", err=True)
     figures = summarize_track(tracked)
     if keeper is not None:
         keeper.save(tracked[-1])
@@ -123,6 +139,19 @@ def track(
         typer.echo(json.dumps(document, allow_nan=False))
     else:
         typer.echo(track_text(tracked, figures))
+
+
+def _searched(
+    recording: Recording, grid: OccupancyGrid, config: AmclConfig
+) -> tuple[Drive, list[TrackedScan]]:
+    from firstfix.cli.searched import NeverFoundError, search_and_follow
+
+    try:
+        with progress(len(recording), "tracking") as done:
+            return search_and_follow(recording, grid, config, done)
+    except NeverFoundError as error:
+        typer.echo(f"{error}")
+        raise typer.Exit(NO_ANSWER) from None
 
 
 def _check_targets(out: Path | None, plot: Path | None, keep_pose: Path | None) -> None:

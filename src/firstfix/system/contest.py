@@ -13,8 +13,8 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.locate import Locator
 from firstfix.global_localization.verdict import log_likelihoods
+from firstfix.system.candidate import moved_on, same_place
 from firstfix.system.config import WatchConfig
-from firstfix.system.watch import same_place
 
 # Two scans half a metre apart are half as good as two of different robots.
 _NEWS = 0.5
@@ -86,9 +86,7 @@ class Contest:
 
     def brings_news(self, T_odom_base: SE2) -> bool:
         """Tell whether the robot has moved enough for a scan to say something new."""
-        moved = self._looked_at.inverse() @ T_odom_base
-        far = math.hypot(moved.x, moved.y) >= self._config.look_again_m
-        return far or abs(moved.yaw) >= self._config.look_again_rad
+        return moved_on(self._looked_at, T_odom_base, self._config)
 
     def look(self, scan: LaserScan, T_odom_base: SE2) -> Standing:
         """Weigh the places by a scan, and ask whether the whole map has a better one.

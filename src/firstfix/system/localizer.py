@@ -17,6 +17,7 @@ from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.locate import Locator
+from firstfix.system.candidate import Candidates, moved_on
 from firstfix.system.config import LocalizerConfig
 from firstfix.system.contest import Contest, Standing
 from firstfix.system.deciding_motion import deciding_motion
@@ -35,6 +36,9 @@ _BEGIN_COVARIANCE = np.diag([0.03**2, 0.03**2, np.radians(1.0) ** 2])
 # A robot that stands where nothing fits sees the same again: people may go, so once a second.
 _PATIENCE_S = 1.0
 _MOVED_M = 0.1
+
+# How far a robot may be from where its track was lost and still be believed at the first word.
+_STRAYED_M = 2.0
 
 
 class Localizer:
@@ -63,6 +67,9 @@ class Localizer:
         self._found_nothing_at: tuple[float, SE2] | None = None
         self._update_asked = False
         self._hint: SE2 | None = None
+        self._lost_track: SE2 | None = None  # T_map_odom, if contradicted and not picked up since
+        self._last_word_at: SE2 | None = None
+        self._candidates = Candidates(self.config.watch)
         self._track: Track | None = None
         self._locator: Locator
         self._tracker: Tracker
@@ -178,6 +185,9 @@ class Localizer:
             evidence = best.evidence if best is not None else None
             return [Status(scan.stamp, self.state, result.reason, evidence)]
         if result.verdict is Verdict.UNIQUE:
+            if not self._believable(T_odom_base, best):
+                reason = "one place fits, far from where the track was lost: waiting for more"
+                return [Status(scan.stamp, self.state, reason, best.evidence)]
             return self._arrive(scan, T_odom_base, best, Event.ONE_PLACE, result.reason)
         self._contest = Contest(result.hypotheses, T_odom_base, self._locator, self.config.watch)
         self.state = after(self.state, Event.SEVERAL_PLACES)
@@ -246,6 +256,22 @@ class Localizer:
             Status(scan.stamp, self.state, reason, place.evidence),
         ]
 
+    def _believable(self, T_odom_base: SE2, place: Hypothesis) -> bool:
+        """Tell whether a UNIQUE place may be published.
+
+        A robot that lost its track and was not picked up is not far, or it has left the mapped
+        area: for a place far away, several scans from different places must speak.
+        """
+        if self._lost_track is None:
+            return True
+        if place.pose.distance_to(self._lost_track @ T_odom_base) <= _STRAYED_M:
+            return True
+        before = self._last_word_at
+        if before is not None and not moved_on(before, T_odom_base, self.config.watch):
+            return False
+        self._last_word_at = T_odom_base
+        return self._candidates.count(place.pose, T_odom_base) >= self.config.watch.won_looks
+
     def _worth_searching(self, scan: LaserScan, T_odom_base: SE2) -> bool:
         """Tell whether a scan may say what the last, which fitted nowhere, did not."""
         if self._found_nothing_at is None:
@@ -268,6 +294,10 @@ class Localizer:
     def _forget(
         self, stamp: float, event: Event, reason: str, evidence: Evidence | None = None
     ) -> Status:
+        contradicted = event is Event.LOST and self._track is not None
+        self._lost_track = self._track.T_map_odom if contradicted and self._track else None
+        self._last_word_at = None
+        self._candidates.clear()
         self._track = None
         self._hint = None
         self._waiting = None

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from firstfix.core.angles import angle_error
 from firstfix.core.estimate import Hypothesis, Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.locate import Locator
+from firstfix.system.candidate import Candidates, same_place
 from firstfix.system.config import WatchConfig
 
 # Another place must fit so much better that it is not the same fit, a little refined.
@@ -51,14 +51,6 @@ class Look:
     place: Hypothesis
 
 
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """Another place, and how many scans in a row speak for it."""
-
-    T_map_odom: SE2
-    scans: int
-
-
 class Watch:
     """Judges a track scan by scan; remembers since when it has been contradicted.
 
@@ -74,7 +66,7 @@ class Watch:
         self._locator = locator
         self._config = config
         self._contradicted_since: float | None = None
-        self._candidate: Candidate | None = None
+        self._candidates = Candidates(config)
         self._searched_at: float | None = None
         self._usual_cost = _GOOD_COST
 
@@ -101,9 +93,11 @@ class Watch:
             self._usual_cost += _USUAL_RATE * (tracked.score - self._usual_cost)
             return Look(Finding.FITS, tracked)
         place = self._better_place(scan, tracked, T_map_base)
-        if place is not None and self._confirmed(place, T_odom_base):
-            self._calm_down()
-            return Look(Finding.ELSEWHERE, place)
+        if place is not None:
+            scans = self._candidates.count(place.pose, T_odom_base)
+            if scans >= self._config.confirmations:
+                self._calm_down()
+                return Look(Finding.ELSEWHERE, place)
         if tracked.score <= self._config.impossible_cost:
             self._contradicted_since = None
         elif self._contradicted_since is None:
@@ -121,6 +115,8 @@ class Watch:
         off = T_map_base.inverse() @ near.pose
         if fits and math.hypot(off.x, off.y) <= _SLIP_M and abs(off.yaw) <= _SLIP_RAD:
             return near
+        if tracked.score <= self._config.impossible_cost:
+            return None  # most of the scan fits here: people, or the edge of the map
         if self._searched_at is not None:
             waited = scan.stamp - self._searched_at
             if 0.0 <= waited < self._config.search_period_s:
@@ -129,31 +125,16 @@ class Watch:
         result = self._locator.locate(scan)
         best = result.best
         if best is None or best.score > self._config.doubtful_cost:
-            self._candidate = None
+            self._candidates.clear()
             return None
         if same_place(best.pose, T_map_base, self._config):  # nowhere does it fit better
             self._calm_down()
             return None
         if result.verdict is Verdict.UNIQUE and best.score <= _BETTER * tracked.score:
             return best
-        self._candidate = None
+        self._candidates.clear()
         return None
-
-    def _confirmed(self, place: Hypothesis, T_odom_base: SE2) -> bool:
-        """Count the scans in a row that, carried by odometry, mean the same place."""
-        scans = 1
-        if self._candidate is not None:
-            expected = self._candidate.T_map_odom @ T_odom_base
-            if same_place(place.pose, expected, self._config):
-                scans += self._candidate.scans
-        self._candidate = Candidate(place.pose @ T_odom_base.inverse(), scans)
-        return scans >= self._config.confirmations
 
     def _calm_down(self) -> None:
         self._contradicted_since = None
-        self._candidate = None
-
-
-def same_place(a: SE2, b: SE2, config: WatchConfig) -> bool:
-    """Tell whether two poses are one place."""
-    return a.distance_to(b) <= config.agree_m and angle_error(a.yaw, b.yaw) <= config.agree_rad
+        self._candidates.clear()
