@@ -24,8 +24,8 @@ _BEFORE_S = 12.0
 _NOTHING_S = 60.0
 
 # So many people around a robot take 20 to 40 % of its beams; those who walk about take fewer.
-_AROUND = (3, 4, 5)
-_ABOUT = 8
+_AROUND = (5, 6, 7)
+_ABOUT = 12
 
 
 def scripted(seed: int, after_s: float = AFTER_S) -> tuple[str, list[Phase]]:

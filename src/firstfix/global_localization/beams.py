@@ -14,6 +14,9 @@ from firstfix.fields.range_table import DIRECTIONS
 # Maps drift over such distances, and farther beams are too few to lose much.
 LONGEST_M = 30.0
 
+# Fewer beams on surfaces than this cannot tell places apart, whatever they say.
+FEWEST_HITS = 8
+
 
 @dataclass(frozen=True, eq=False)
 class Beams:

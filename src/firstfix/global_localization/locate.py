@@ -21,7 +21,7 @@ from firstfix.global_localization.answer import (
     nothing_to_match,
     to_map,
 )
-from firstfix.global_localization.beams import usable_beams
+from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
 from firstfix.global_localization.config import LocateConfig, Method
 from firstfix.global_localization.examine import examine, locate_near
 from firstfix.global_localization.places import distinct_places
@@ -29,9 +29,6 @@ from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.search import search
 from firstfix.global_localization.verdict import judge, place_probabilities
 from firstfix.global_localization.verify import Verification, verify
-
-# Fewer beams than this cannot tell places apart, whatever they say.
-_FEWEST_HITS = 8
 
 # A third of the beams sorts out most places; the rest is spent on those that stay.
 _FIRST_LOOK_BEAMS = 60
@@ -154,8 +151,8 @@ def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateRe
     resolution = fields.grid.resolution
     beams = usable_beams(scan)
     hits = int(np.count_nonzero(beams.hit))
-    if hits < _FEWEST_HITS:
-        return nothing_to_match(scan, hits, _FEWEST_HITS, time.perf_counter() - started)
+    if hits < FEWEST_HITS:
+        return nothing_to_match(scan, hits, FEWEST_HITS, time.perf_counter() - started)
 
     candidates, report = search(beams, fields, config.shortlist, config.budget_s)
     poses = refine_on_field(candidates.poses, beams, fields)

@@ -21,6 +21,7 @@ _NEWS = 0.5
 # A place of the whole map that is less likely, against the best there, is no rival.
 _RIVAL_SHARE = 0.1
 _MOST_ENTRIES = 64
+_LEAST_UNLISTED = 1e-3
 
 
 class Standing(Enum):
@@ -70,6 +71,9 @@ class Contest:
         self._looked_at = T_odom_base
         self._looks = 0
         self._misses = 0
+        # That the robot is where nobody has listed it; such a place fits doubtfully.
+        unlisted = 1.0 - sum(place.probability for place in places)
+        self._log_unlisted = math.log(max(unlisted, _LEAST_UNLISTED))
         self._entries = [
             Entry(place.pose @ T_odom_base.inverse(), math.log(max(place.probability, 1e-9)), place)
             for place in places
@@ -78,9 +82,9 @@ class Contest:
     @property
     def places(self) -> tuple[Hypothesis, ...]:
         """The places as of the last look, with their probabilities in the contest, best first."""
-        logs = np.array([entry.log_weight for entry in self._entries])
+        logs = np.array([*(entry.log_weight for entry in self._entries), self._log_unlisted])
         weights = np.exp(logs - logs.max())
-        shares = (weights / weights.sum()).tolist()
+        shares = (weights / weights.sum())[:-1].tolist()
         ranked = sorted(zip(shares, self._entries, strict=True), key=lambda pair: -pair[0])
         return tuple(replace(entry.place, probability=share) for share, entry in ranked)
 
@@ -128,8 +132,9 @@ class Contest:
         """
         poses = [entry.T_map_odom @ T_odom_base for entry in self._entries]
         examined = self._locator.examine(scan, poses)
-        scores = np.array([place.score for place in examined])
-        logs = _NEWS * log_likelihoods(scores, examined[0].evidence.beams)
+        scores = np.array([*(place.score for place in examined), self._config.doubtful_cost])
+        *logs, unlisted = _NEWS * log_likelihoods(scores, examined[0].evidence.beams)
+        self._log_unlisted += float(unlisted)
         weighed = [
             Entry(place.pose @ T_odom_base.inverse(), entry.log_weight + float(log), place)
             for entry, place, log in zip(self._entries, examined, logs, strict=True)

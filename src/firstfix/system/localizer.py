@@ -233,7 +233,10 @@ class Localizer:
             reason = f"only {evidence.explained:.0%} of the beams fit here, for too long: searching"
             return [self._forget(scan.stamp, Event.LOST, reason, evidence)]
         said = f"{evidence.explained:.0%} of the beams fit"
-        reason = said if look.finding is Finding.FITS else f"doubtful: only {said}"
+        reason = {
+            Finding.FITS: said,
+            Finding.SILENT: "the sensor sees too little to tell: going on by odometry",
+        }.get(look.finding, f"doubtful: only {said}")
         covariance = track.state.estimate.covariance
         return [
             TrackedPose(scan.stamp, T_map_base, covariance, track.T_map_odom),

@@ -6,9 +6,12 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
 from firstfix.core.estimate import Hypothesis, Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
 from firstfix.global_localization.locate import Locator
 from firstfix.system.candidate import Candidates, same_place
 from firstfix.system.config import WatchConfig
@@ -29,6 +32,7 @@ _SLIP_RAD = math.radians(30.0)
 class Finding(Enum):
     """What a scan says about the tracked pose."""
 
+    SILENT = "silent"
     FITS = "fits"
     DOUBTFUL = "doubtful"
     ELSEWHERE = "elsewhere"
@@ -88,6 +92,8 @@ class Watch:
             The finding. ELSEWHERE needs several scans in a row that agree.
         """
         (tracked,) = self._locator.examine(scan, [T_map_base])
+        if np.count_nonzero(usable_beams(scan).hit) < FEWEST_HITS:
+            return Look(Finding.SILENT, tracked)  # a hand before the sensor is no evidence
         if tracked.score <= self._config.doubtful_cost:
             self._calm_down()
             self._usual_cost += _USUAL_RATE * (tracked.score - self._usual_cost)
