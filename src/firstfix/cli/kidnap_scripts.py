@@ -24,7 +24,7 @@ _BEFORE_S = 12.0
 _NOTHING_S = 60.0
 
 # So many people around a robot take 20 to 40 % of its beams; those who walk about take fewer.
-_AROUND = (5, 6, 7)
+_AROUND = (4, 5, 6)
 _ABOUT = 12
 
 
