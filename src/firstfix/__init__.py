@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from firstfix.core.errors import FirstfixError, InputError, MapError, ScanError
     from firstfix.core.estimate import Evidence, Hypothesis, LocateResult, SearchReport, Verdict
     from firstfix.core.grid import OccupancyGrid
+    from firstfix.core.odometry import Odometry
     from firstfix.core.recording import Recording
     from firstfix.core.scan import LaserScan, Mounting
     from firstfix.core.se2 import SE2
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from firstfix.formats.recording import load_recording
     from firstfix.global_localization.config import LocateConfig, Method
     from firstfix.global_localization.locate import Locator
+    from firstfix.system.config import LocalizerConfig
+    from firstfix.system.inputs import NewMap
+    from firstfix.system.localizer import Localizer
 
 __version__ = "0.1.0"
 
@@ -26,13 +30,17 @@ __all__ = [  # noqa: RUF022 - plainly sorted, as a reader looks for a name
     "Hypothesis",
     "InputError",
     "LaserScan",
+    "Localizer",
+    "LocalizerConfig",
     "LocateConfig",
     "LocateResult",
     "Locator",
     "MapError",
     "Method",
     "Mounting",
+    "NewMap",
     "OccupancyGrid",
+    "Odometry",
     "Recording",
     "SE2",
     "ScanError",
@@ -49,6 +57,7 @@ _ROOMS = {
     "core.errors": ("FirstfixError", "InputError", "MapError", "ScanError"),
     "core.estimate": ("Evidence", "Hypothesis", "LocateResult", "SearchReport", "Verdict"),
     "core.grid": ("OccupancyGrid",),
+    "core.odometry": ("Odometry",),
     "core.recording": ("Recording",),
     "core.scan": ("LaserScan", "Mounting"),
     "core.se2": ("SE2",),
@@ -57,6 +66,9 @@ _ROOMS = {
     "formats.recording": ("load_recording",),
     "global_localization.config": ("LocateConfig", "Method"),
     "global_localization.locate": ("Locator",),
+    "system.config": ("LocalizerConfig",),
+    "system.inputs": ("NewMap",),
+    "system.localizer": ("Localizer",),
 }
 _HOMES = {name: room for room, names in _ROOMS.items() for name in names}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
@@ -79,3 +80,8 @@ def test_the_diagram_does_not_depend_on_the_order_of_the_table(
     reverse = dict(reversed(TABLE.items()))
     monkeypatch.setattr("firstfix.system.transitions.TABLE", reverse)
     assert diagram() == before
+
+
+def test_the_picture_in_the_docs_is_drawn_from_the_table() -> None:
+    page = Path(__file__).parents[2] / "docs" / "states.md"
+    assert f"```mermaid\n{diagram()}```" in page.read_text(encoding="utf-8")
