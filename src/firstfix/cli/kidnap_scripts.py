@@ -23,7 +23,8 @@ _STARTING_S = 2.0
 _BEFORE_S = 12.0
 _NOTHING_S = 60.0
 
-# So many people around a robot take 20 to 40 % of its beams; those who walk about take fewer.
+# So many people around a robot mostly take 20 to 45 % of its beams (medians of 24 scenarios: 13 to
+# 53 %); those who walk about, 1 to 41 %.
 _AROUND = (4, 5, 6)
 _ABOUT = 12
 
