@@ -1,0 +1,158 @@
+"""A robot that stands or drives in a drawn world and tells a localizer what it sees."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.odometry import Odometry
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.global_localization.locate import Locator
+from firstfix.sim.drawing import Drawing
+from firstfix.sim.lidar import Lidar
+from firstfix.sim.office import office as draw_office
+from firstfix.sim.world import identical_rooms
+from firstfix.system.inputs import Input, NewMap
+from firstfix.system.localizer import Localizer
+from firstfix.system.outputs import Output
+
+Damage = Callable[[LaserScan], LaserScan]
+HALF_LIDAR = Lidar(beams=120, fov=math.pi)
+
+
+class Robot:
+    """One robot, its world, its localizer, and all that this has said.
+
+    Each `tick` is 0.1 s: the robot moves, its odometry is told, then its scan.
+    """
+
+    def __init__(
+        self,
+        world: OccupancyGrid,
+        pose: SE2,
+        localizer: Localizer,
+        *,
+        lidar: Lidar | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.world = world
+        self.pose = pose
+        self.localizer = localizer
+        self.lidar = lidar or Lidar(beams=180)
+        self.T_odom_base = SE2(-3.0, 7.0, 2.0)
+        self.stamp = 100.0
+        self.said: list[Output] = []
+        self._ticks = 0
+        self._rng = np.random.default_rng(seed)
+
+    def tell(self, given: Input) -> list[Output]:
+        """Hand an input to the localizer."""
+        outputs = self.localizer.handle(given)
+        self.said += outputs
+        return outputs
+
+    def scan(self) -> LaserScan:
+        """Look around."""
+        return self.lidar.scan(self.world, self.pose, self._rng, self.stamp)
+
+    def tick(self, moved: SE2 | None = None, damage: Damage | None = None) -> list[Output]:
+        """Let 0.1 s pass."""
+        moved = moved or SE2.identity()
+        self._ticks += 1
+        self.stamp = 100.0 + self._ticks / 10
+        self.pose = self.pose @ moved
+        self.T_odom_base = self.T_odom_base @ moved
+        scan = self.scan()
+        odometry = self.tell(Odometry(self.stamp, self.T_odom_base))
+        return odometry + self.tell(damage(scan) if damage else scan)
+
+    def ticks(self, n: int, moved: SE2 | None = None, damage: Damage | None = None) -> list[Output]:
+        """Let n times 0.1 s pass."""
+        return [output for _ in range(n) for output in self.tick(moved, damage)]
+
+
+@pytest.fixture(scope="session")
+def maps_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("maps")
+
+
+@pytest.fixture
+def robot_in(maps_cache: Path) -> Callable[..., Robot]:
+    """Give a function that puts a robot into a world; its map is that of the world."""
+
+    def place(world: OccupancyGrid, pose: SE2, **settings: object) -> Robot:
+        localizer = Localizer(cache_dir=maps_cache)
+        localizer.handle(NewMap(99.0, world))
+        return Robot(world, pose, localizer, **settings)  # type: ignore[arg-type]
+
+    return place
+
+
+@pytest.fixture(scope="session")
+def with_ranges() -> Callable[..., Damage]:
+    """Give a function that makes a damage: all ranges of a scan become these."""
+
+    def make(ranges: Callable[[LaserScan], object]) -> Damage:
+        def damage(scan: LaserScan) -> LaserScan:
+            values = np.broadcast_to(np.asarray(ranges(scan), np.float32), (len(scan),))
+            return dataclasses.replace(scan, ranges=values)
+
+        return damage
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def office() -> OccupancyGrid:
+    return draw_office()
+
+
+@pytest.fixture(scope="session")
+def three_rooms() -> OccupancyGrid:
+    """Three rooms of one plan, doors closed: x counts from 0, 8 and 16 m."""
+    return identical_rooms(3)
+
+
+@pytest.fixture(scope="session")
+def two_rooms() -> OccupancyGrid:
+    """Two rooms, 7 m apart, that differ behind a robot which looks along +x: a shelf in one."""
+    plan = Drawing(13.0, 5.0, 0.05, 1.0)
+    for x in (0.0, 7.0):
+        plan.room(x, 0.0, x + 5.0, 4.6)
+        plan.solid(x + 4.0, 3.2, x + 4.9, 4.5)
+        plan.solid(x + 4.5, 0.1, x + 4.9, 0.8)
+    plan.solid(7.1, 1.5, 7.9, 2.5)
+    return plan.grid()
+
+
+@pytest.fixture(scope="session")
+def hall_locator(hall_plan: OccupancyGrid) -> Locator:
+    return Locator(hall_plan)
+
+
+@pytest.fixture(scope="session")
+def office_locator(office: OccupancyGrid) -> Locator:
+    return Locator(office)
+
+
+@pytest.fixture(scope="session")
+def three_rooms_locator(three_rooms: OccupancyGrid) -> Locator:
+    return Locator(three_rooms)
+
+
+@pytest.fixture(scope="session")
+def two_rooms_locator(two_rooms: OccupancyGrid) -> Locator:
+    return Locator(two_rooms)
+
+
+@pytest.fixture(scope="session")
+def half_lidar() -> Lidar:
+    """See the half in front only."""
+    return HALF_LIDAR
