@@ -47,7 +47,7 @@ class WatchConfig:
 
     doubtful_cost: float = 1.7
     impossible_cost: float = 2.3
-    lost_after_s: float = 3.0
+    lost_after_s: float = 2.0
     search_period_s: float = 0.2
     confirmations: int = 2
     agree_m: float = 0.5

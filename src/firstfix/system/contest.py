@@ -106,24 +106,25 @@ class Contest:
         -------
         Standing
             WON if the scan is UNIQUE at one of the places, or if one has nearly all of the
-            probability after some looks, and fits; LOST if not even the best fits several times in
-            a row; else OPEN.
+            probability after some looks, and fits; LOST if none of the places fits several times in
+            a row, as after a kidnap; else OPEN.
         """
         self._looked_at = T_odom_base
         self._looks += 1
         self._weigh(scan, T_odom_base)
+        fits = any(e.place.score <= self._config.doubtful_cost for e in self._entries)
+        self._misses = 0 if fits else self._misses + 1
+        if self._misses >= self._config.won_looks:
+            return Standing.LOST
         result = self._locator.locate(scan)
         if result.verdict is Verdict.UNIQUE and self._wins_outright(result.hypotheses[0]):
             return Standing.WON
         self._admit(result, T_odom_base)
         best = self.places[0]
-        fits = best.score <= self._config.doubtful_cost
-        self._misses = 0 if fits else self._misses + 1
-        if self._misses >= self._config.won_looks:
-            return Standing.LOST
         decided = best.probability >= self._config.won_probability
+        decided = decided and best.score <= self._config.doubtful_cost
         enough = self._looks >= self._config.won_looks
-        return Standing.WON if decided and fits and enough else Standing.OPEN
+        return Standing.WON if decided and enough else Standing.OPEN
 
     def _weigh(self, scan: LaserScan, T_odom_base: SE2) -> None:
         """Multiply the weights of all places by what the scan says there, even of hopeless ones.

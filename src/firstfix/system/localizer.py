@@ -17,7 +17,7 @@ from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.locate import Locator
-from firstfix.system.candidate import Candidates, moved_on
+from firstfix.system.candidate import Candidates, moved_on, same_place
 from firstfix.system.config import LocalizerConfig
 from firstfix.system.contest import Contest, Standing
 from firstfix.system.deciding_motion import deciding_motion
@@ -226,6 +226,8 @@ class Localizer:
         T_map_base = track.T_map_odom @ T_odom_base
         look = self._watch.look(scan, T_odom_base, T_map_base)
         if look.finding is Finding.ELSEWHERE:
+            if same_place(look.place.pose, T_map_base, self.config.watch):
+                return self._correct(scan, T_odom_base, look.place)
             reason = f"found {look.place.pose.distance_to(T_map_base):.1f} m from the track"
             return self._arrive(scan, T_odom_base, look.place, Event.FOUND_ELSEWHERE, reason)
         evidence = look.place.evidence
@@ -258,6 +260,12 @@ class Localizer:
             TrackedPose(scan.stamp, place.pose, covariance, place.pose @ T_odom_base.inverse()),
             Status(scan.stamp, self.state, reason, place.evidence),
         ]
+
+    def _correct(self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis) -> list[Output]:
+        """Put a track right that is a little off; the robot was neither lost nor found."""
+        found, *outputs = self._arrive(scan, T_odom_base, place, Event.FOUND_ELSEWHERE, "put right")
+        del found
+        return outputs
 
     def _believable(self, T_odom_base: SE2, place: Hypothesis) -> bool:
         """Tell whether a UNIQUE place may be published.
