@@ -113,7 +113,6 @@ def test_who_is_elsewhere_does_not_win_where_the_places_were(
     raise AssertionError("neither lost nor found")
 
 
-@pytest.mark.xfail(reason="the best of wrong places wins if it is much better than the others")
 def test_in_a_foreign_building_nothing_wins(hall_plan, office_locator):
     """A hall on the map of the office: about two thirds of the beams fit some room."""
     lidar = Lidar(beams=180)

@@ -76,7 +76,7 @@ def test_elsewhere_takes_two_scans_that_agree(watch, seen, moved):
 
 def test_two_scans_that_disagree_move_nobody(watch, seen):
     findings = [
-        watch.look(seen(pose, 0.3 * k), ODOM, HERE).finding
+        watch.look(seen(pose, 0.25 * k), ODOM, HERE).finding
         for k, pose in enumerate([THERE, THIRD] * 4)
     ]
     assert findings == [Finding.DOUBTFUL] * 8
@@ -127,7 +127,7 @@ def test_contradiction_must_last(watch, absurd):
 
 def test_one_good_scan_ends_a_contradiction(watch, absurd, seen):
     for k in range(60):
-        good = k % 25 == 24
+        good = k % 18 == 17
         scan = seen(HERE, 0.1 * k) if good else absurd(0.1 * k)
         finding = watch.look(scan, ODOM, HERE).finding
         assert finding is (Finding.FITS if good else Finding.DOUBTFUL)

@@ -26,6 +26,7 @@ _THROUGH_M = 0.3
 _THROUGH_COST = 2.0
 _THROUGH_LIMIT_M = 1.0
 _SHORT_LIMIT_M = 0.4
+_INSIDE_WALL_COST = 6.0
 
 # A missing return may be glass or black paint: half as telling as a hit.
 _NO_RETURN_WEIGHT = 0.5
@@ -120,6 +121,12 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
     for k in range(poses.shape[0]):
         cost = 0.0
         cos, sin = math.cos(poses[k, 2]), math.sin(poses[k, 2])
+        column, row = math.floor(poses[k, 0]), math.floor(poses[k, 1])
+        if 0 <= column < width and 0 <= row < height and clearance[row, column] == 0:
+            # No sensor sees from within a wall, though all that is very near would fit there.
+            scores[k] = _INSIDE_WALL_COST
+            counts[k, THROUGH] = ranges.shape[0]
+            continue
         for i in range(ranges.shape[0]):
             dx = cos * cosines[i] - sin * sines[i]
             dy = sin * cosines[i] + cos * sines[i]

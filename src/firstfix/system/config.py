@@ -33,8 +33,15 @@ class WatchConfig:
         Up to where two poses are one place.
     look_again_m, look_again_rad : float
         Motion after which a further scan brings news about an ambiguous place.
+    look_again_s : float
+        Time after which a robot at rest is looked at again: people and hands go, s.
+    off_m, off_rad : float
+        Error of a track that is put right although the scan still fits.
     won_probability : float
         Probability that a place must have to win without a UNIQUE scan.
+    won_cost : float
+        Mean cost up to which it may do so: a place found by search fits better than one that is
+        only not contradicted.
     won_looks : int
         Looks that this takes at least; and looks in a row at which not even the best place fits,
         after which all are given up.
@@ -54,7 +61,11 @@ class WatchConfig:
     agree_rad: float = math.radians(15.0)
     look_again_m: float = 0.5
     look_again_rad: float = math.radians(30.0)
+    look_again_s: float = 1.0
+    off_m: float = 0.15
+    off_rad: float = math.radians(5.0)
     won_probability: float = 0.99
+    won_cost: float = 1.3
     won_looks: int = 3
 
     def __post_init__(self) -> None:

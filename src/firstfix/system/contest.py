@@ -71,13 +71,10 @@ class Contest:
         self._looked_at = T_odom_base
         self._looks = 0
         self._misses = 0
-        # That the robot is where nobody has listed it; such a place fits doubtfully.
+        # That the robot is where nobody has listed it, in another building perhaps.
         unlisted = 1.0 - sum(place.probability for place in places)
         self._log_unlisted = math.log(max(unlisted, _LEAST_UNLISTED))
-        self._entries = [
-            Entry(place.pose @ T_odom_base.inverse(), math.log(max(place.probability, 1e-9)), place)
-            for place in places
-        ]
+        self._entries = _entries(places, T_odom_base)
 
     @property
     def places(self) -> tuple[Hypothesis, ...]:
@@ -122,9 +119,30 @@ class Contest:
         self._admit(result, T_odom_base)
         best = self.places[0]
         decided = best.probability >= self._config.won_probability
-        decided = decided and best.score <= self._config.doubtful_cost
+        decided = decided and best.score <= self._config.won_cost
         enough = self._looks >= self._config.won_looks
         return Standing.WON if decided and enough else Standing.OPEN
+
+    def look_at_rest(self, scan: LaserScan, T_odom_base: SE2) -> Standing:
+        """Ask whether the scan at the same place has become a better one: people and hands go.
+
+        It is no second witness, so nothing is weighed; but a UNIQUE scan decides, and as long as no
+        motion has decided anything, the places are those of the last scan. Arguments as in `look`.
+
+        Returns
+        -------
+        Standing
+            WON or OPEN.
+        """
+        result = self._locator.locate(scan)
+        best = result.best
+        if best is None or result.verdict is Verdict.NO_MATCH:
+            return Standing.OPEN
+        if self._looks == 0:
+            self._entries = _entries(result.hypotheses, T_odom_base)
+        if result.verdict is Verdict.UNIQUE and self._wins_outright(best):
+            return Standing.WON
+        return Standing.OPEN
 
     def _weigh(self, scan: LaserScan, T_odom_base: SE2) -> None:
         """Multiply the weights of all places by what the scan says there, even of hopeless ones.
@@ -133,7 +151,7 @@ class Contest:
         """
         poses = [entry.T_map_odom @ T_odom_base for entry in self._entries]
         examined = self._locator.examine(scan, poses)
-        scores = np.array([*(place.score for place in examined), self._config.doubtful_cost])
+        scores = np.array([*(place.score for place in examined), self._config.won_cost])
         *logs, unlisted = _NEWS * log_likelihoods(scores, examined[0].evidence.beams)
         self._log_unlisted += float(unlisted)
         weighed = [
@@ -173,3 +191,10 @@ class Contest:
             if same_place(entry.place.pose, place.pose, self._config):
                 return entry
         return None
+
+
+def _entries(places: tuple[Hypothesis, ...], T_odom_base: SE2) -> list[Entry]:
+    return [
+        Entry(place.pose @ T_odom_base.inverse(), math.log(max(place.probability, 1e-9)), place)
+        for place in places
+    ]

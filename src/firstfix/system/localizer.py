@@ -37,6 +37,10 @@ _BEGIN_COVARIANCE = np.diag([0.03**2, 0.03**2, np.radians(1.0) ** 2])
 _PATIENCE_S = 1.0
 _MOVED_M = 0.1
 
+# Where a person says the robot is, it must fit nearly as well as at the best place of the map.
+_AS_GOOD = 1.5
+_GOOD_COST = 0.3
+
 # How far a robot may be from where its track was lost and still be believed at the first word.
 _STRAYED_M = 2.0
 
@@ -66,6 +70,7 @@ class Localizer:
         self._lifted: set[SignalKind] = set()
         self._found_nothing_at: tuple[float, SE2] | None = None
         self._update_asked = False
+        self._looked_at = 0.0
         self._hint: SE2 | None = None
         self._lost_track: SE2 | None = None  # T_map_odom, if contradicted and not picked up since
         self._last_word_at: SE2 | None = None
@@ -105,13 +110,13 @@ class Localizer:
             return self._take_map(given)
         if isinstance(given, Odometry):
             return self._take_odometry(given)
+        if isinstance(given, Signal):
+            return self._take_signal(given)
         if self.state is State.NO_MAP:
             return [Status(given.stamp, self.state, "no map yet")]
         if isinstance(given, LaserScan):
             self._waiting = given
             return self._take_waiting_scan()
-        if isinstance(given, Signal):
-            return self._take_signal(given)
         if isinstance(given, PoseHint):
             return self._take_hint(given)
         if isinstance(given, Reset):
@@ -138,8 +143,11 @@ class Localizer:
             return []
         if not given.active:
             self._lifted.discard(given.kind)
+            self._waiting = None  # taken in somebody's hands
             return []
         self._lifted.add(given.kind)
+        if self.state is State.NO_MAP:
+            return []
         reason = f"{given.kind.value}: waiting until the robot stands again, then searching"
         return [self._forget(given.stamp, Event.KIDNAPPED, reason)]
 
@@ -151,6 +159,7 @@ class Localizer:
 
     def _take_update_request(self, given: NoMotionUpdate) -> list[Output]:
         self._update_asked = True
+        self._found_nothing_at = None
         return [Status(given.stamp, self.state, "the next scan will be used in any case")]
 
     def _take_waiting_scan(self) -> list[Output]:
@@ -190,16 +199,20 @@ class Localizer:
                 return [Status(scan.stamp, self.state, reason, best.evidence)]
             return self._arrive(scan, T_odom_base, best, Event.ONE_PLACE, result.reason)
         self._contest = Contest(result.hypotheses, T_odom_base, self._locator, self.config.watch)
+        self._looked_at = scan.stamp
         self.state = after(self.state, Event.SEVERAL_PLACES)
         return self._tell_places(scan, result.reason)
 
     def _decide(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
         if self._hint is not None:
             return self._check_hint(scan, T_odom_base, self._hint)
-        if not (self._contest.brings_news(T_odom_base) or self._update_asked):
+        if self._contest.brings_news(T_odom_base) or self._update_asked:
+            standing = self._contest.look(scan, T_odom_base)
+        elif not 0.0 <= scan.stamp - self._looked_at < self.config.watch.look_again_s:
+            standing = self._contest.look_at_rest(scan, T_odom_base)
+        else:
             return []
-        self._update_asked = False
-        standing = self._contest.look(scan, T_odom_base)
+        self._update_asked, self._looked_at = False, scan.stamp
         best = self._contest.places[0]
         if standing is Standing.WON:
             reason = f"one place has won; {best.evidence.explained:.0%} of the beams fit there"
@@ -214,11 +227,15 @@ class Localizer:
     def _check_hint(self, scan: LaserScan, T_odom_base: SE2, T_map_base: SE2) -> list[Output]:
         self._hint = None
         place = self._locator.locate_near(scan, T_map_base)
-        fit = f"{place.evidence.explained:.0%} of the beams fit"
-        if place.score <= self.config.watch.doubtful_cost:
-            reason = f"a person said where, and {fit} there"
+        result = self._locator.locate(scan)
+        best = result.best or place
+        known = same_place(place.pose, best.pose, self.config.watch)
+        elsewhere = result.verdict is Verdict.UNIQUE and not known
+        as_good = place.score <= _AS_GOOD * max(best.score, _GOOD_COST)
+        if as_good and not elsewhere and place.score <= self.config.watch.doubtful_cost:
+            reason = f"a person said where; {place.evidence.explained:.0%} of the beams fit there"
             return self._arrive(scan, T_odom_base, place, Event.PLACE_WON, reason)
-        reason = f"a person said where, but only {fit} anywhere near: searching"
+        reason = "a person said where, but the scan fits elsewhere, or nowhere: searching"
         return [self._forget(scan.stamp, Event.LOST, reason, place.evidence)]
 
     def _follow(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
@@ -308,6 +325,7 @@ class Localizer:
         contradicted = event is Event.LOST and self._track is not None
         self._lost_track = self._track.T_map_odom if contradicted and self._track else None
         self._last_word_at = None
+        self._found_nothing_at = None
         self._candidates.clear()
         self._track = None
         self._hint = None

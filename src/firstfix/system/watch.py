@@ -8,6 +8,7 @@ from enum import Enum
 
 import numpy as np
 
+from firstfix.core.angles import angle_error
 from firstfix.core.estimate import Hypothesis, Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
@@ -95,6 +96,13 @@ class Watch:
         if np.count_nonzero(usable_beams(scan).hit) < FEWEST_HITS:
             return Look(Finding.SILENT, tracked)  # a hand before the sensor is no evidence
         if tracked.score <= self._config.doubtful_cost:
+            if self._is_off(tracked.pose, T_map_base):
+                # A small slip at rest: nothing else would put the track right.
+                scans = self._candidates.count(tracked.pose, T_odom_base)
+                if scans >= self._config.confirmations:
+                    self._calm_down()
+                    return Look(Finding.ELSEWHERE, tracked)
+                return Look(Finding.FITS, tracked)
             self._calm_down()
             self._usual_cost += _USUAL_RATE * (tracked.score - self._usual_cost)
             return Look(Finding.FITS, tracked)
@@ -140,6 +148,10 @@ class Watch:
             return best
         self._candidates.clear()
         return None
+
+    def _is_off(self, a: SE2, b: SE2) -> bool:
+        far = a.distance_to(b) > self._config.off_m
+        return far or angle_error(a.yaw, b.yaw) > self._config.off_rad
 
     def _calm_down(self) -> None:
         self._contradicted_since = None
