@@ -201,10 +201,12 @@ def test_a_blind_scan_says_neither_yes_nor_no(hall, value):
     assert locate_near(blind, truth, hall).evidence.beams == 0
 
 
-def test_what_a_hand_over_the_sensor_leaves_fits_nowhere(office_fields):
+def test_what_a_hand_over_the_sensor_leaves_is_not_found_within_a_wall(office_fields):
+    """All that is very near would fit there, beam by beam."""
+    grid = office_fields.grid
     for seed, truth in enumerate(drawn(office_fields, 6, seed=7)):
         scan = seen(office_fields, truth)
         hand = np.random.default_rng(seed).uniform(0.12, 0.3, len(scan)).astype(np.float32)
-        covered = dataclasses.replace(scan, ranges=hand)
-        # 1.7 is where a track begins to be doubted; within a wall all of it would fit.
-        assert locate_near(covered, truth, office_fields).score > 1.7
+        place = locate_near(dataclasses.replace(scan, ranges=hand), truth, office_fields)
+        column, row, _ = to_cells(grid, scan, place.pose).astype(int)
+        assert not grid.occupied[row, column] or place.score > 2.3
