@@ -134,9 +134,9 @@ class Localizer:
 
     def _take_odometry(self, given: Odometry) -> list[Output]:
         before = self._odometry.last
-        if self._odometry.add(given):
-            self._follow_jump(before, given)
-        return self._take_waiting_scan()
+        jumped = self._odometry.add(given)
+        told = self._follow_jump(before, given) if jumped else []
+        return told + self._take_waiting_scan()
 
     def _take_signal(self, given: Signal) -> list[Output]:
         if given.kind not in _LIFTED:
@@ -342,17 +342,20 @@ class Localizer:
         ]
         return [*outputs, motion] if motion is not None else outputs
 
-    def _follow_jump(self, before: Odometry | None, now: Odometry) -> None:
+    def _follow_jump(self, before: Odometry | None, now: Odometry) -> list[Output]:
         """Go on at the same pose in a new odometry frame; the next scan will tell whether."""
         if self.state is State.TRACKING and self._hint is None:
-            self.state = after(self.state, Event.LOST)  # places that moved with the old frame
+            # The places moved with the old frame.
+            reason = "odometry jumped before one of several places had won: searching anew"
+            return [self._forget(now.stamp, Event.LOST, reason)]
         if self._track is None or before is None:
-            return
+            return []
         T_map_base = self._track.T_map_odom @ before.T_odom_base
         T_before_now = self._track.state.estimate.pose.inverse() @ T_map_base
         # Odometry that would have brought the track here, had its frame always been the new one.
         self._track = Track(self._track.state, now.T_odom_base @ T_before_now.inverse())
         self._watch = Watch(self._locator, self.config.watch)
+        return []
 
     @staticmethod
     def _no_injection(_: LaserScan, __: int, ___: np.random.Generator) -> NDArray[np.float64]:
