@@ -40,8 +40,8 @@ class WatchConfig:
     won_probability : float
         Probability that a place must have to win without a UNIQUE scan.
     won_cost : float
-        Mean cost up to which it may do so: a place found by search fits better than one that is
-        only not contradicted.
+        Mean cost up to which a place may win, or a track may move to it: what is found by search
+        must fit better than what is only not contradicted.
     won_looks : int
         Looks that this takes at least; and looks in a row at which not even the best place fits,
         after which all are given up.

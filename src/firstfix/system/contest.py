@@ -166,7 +166,7 @@ class Contest:
 
     def _wins_outright(self, place: Hypothesis) -> bool:
         known = self._known(place)
-        if known is None:
+        if known is None or place.score > self._config.won_cost:
             return False
         self._entries = [replace(known, place=place)]
         return True

@@ -144,7 +144,8 @@ class Watch:
         if same_place(best.pose, T_map_base, self._config):  # nowhere does it fit better
             self._calm_down()
             return None
-        if result.verdict is Verdict.UNIQUE and best.score <= _BETTER * tracked.score:
+        fits_well = best.score <= min(self._config.won_cost, _BETTER * tracked.score)
+        if result.verdict is Verdict.UNIQUE and fits_well:
             return best
         self._candidates.clear()
         return None
