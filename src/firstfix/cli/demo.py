@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from firstfix.cli.progress import progress, working
+from firstfix.cli.progress import working
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -56,12 +56,8 @@ def demo(
         from firstfix.system.localizer import Localizer
 
         warm_up()
-    scenes = []
-    with progress(2, "the story") as done:
-        for scene in play(grid, seed, Localizer()):
-            scenes.append(scene)
-            if len(scenes) == 1:
-                done("driving")
+    with working("the robot drives, and somebody is up to something"):
+        scenes = list(play(grid, seed, Localizer()))
     acts = tell_acts(scenes)
     for line in _told(scenes, acts):
         typer.echo(line)
