@@ -104,7 +104,7 @@ class Contest:
         Standing
             WON if the scan is UNIQUE at one of the places, or if one has nearly all of the
             probability after some looks, and fits; LOST if none of the places fits several times in
-            a row, as after a kidnap; else OPEN.
+            a row, as after a kidnap, or if they have become too many; else OPEN.
         """
         self._looked_at = T_odom_base
         self._looks += 1
@@ -117,6 +117,8 @@ class Contest:
         if result.verdict is Verdict.UNIQUE and self._wins_outright(result.hypotheses[0]):
             return Standing.WON
         self._admit(result, T_odom_base)
+        if len(self._entries) >= _MOST_ENTRIES:
+            return Standing.LOST  # the right place may be one that there was no room for
         best = self.places[0]
         decided = best.probability >= self._config.won_probability
         decided = decided and best.score <= self._config.won_cost
