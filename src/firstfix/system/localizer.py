@@ -127,8 +127,8 @@ class Localizer:
 
     def _take_map(self, given: NewMap) -> list[Output]:
         locator = Locator(given.grid, config=self.config.locate, cache_dir=self._cache_dir)
-        self._locator = locator
         sensor = build_sensor(given.grid, self.config.amcl)
+        self._locator = locator
         self._tracker = Tracker(sensor, self.config.amcl, self._no_injection)
         return [self._forget(given.stamp, Event.MAP_CAME, "a map came: searching")]
 
@@ -267,22 +267,28 @@ class Localizer:
     def _arrive(
         self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis, event: Event, reason: str
     ) -> list[Output]:
-        """Publish a pose, and follow from there."""
-        covariance = place.covariance + _BEGIN_COVARIANCE
-        n = self.config.amcl.max_particles
-        self._begin(around_pose(place.pose, covariance, n, self._rng), T_odom_base)
+        """Tell that the robot is found, and follow from there."""
+        tracked = self._settle(scan, T_odom_base, place)
         self.state = after(self.state, event)
         return [
-            InitialPose(scan.stamp, place.pose, covariance),
-            TrackedPose(scan.stamp, place.pose, covariance, place.pose @ T_odom_base.inverse()),
+            InitialPose(scan.stamp, place.pose, tracked.covariance),
+            tracked,
             Status(scan.stamp, self.state, reason, place.evidence),
         ]
 
     def _correct(self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis) -> list[Output]:
         """Put a track right that is a little off; the robot was neither lost nor found."""
-        found, *outputs = self._arrive(scan, T_odom_base, place, Event.FOUND_ELSEWHERE, "put right")
-        del found
-        return outputs
+        tracked = self._settle(scan, T_odom_base, place)
+        return [tracked, Status(scan.stamp, self.state, "put right", place.evidence)]
+
+    def _settle(self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis) -> TrackedPose:
+        """Begin a track at a place."""
+        covariance = place.covariance + _BEGIN_COVARIANCE
+        n = self.config.amcl.max_particles
+        self._track = Track(start(around_pose(place.pose, covariance, n, self._rng)), T_odom_base)
+        self._watch = Watch(self._locator, self.config.watch)
+        T_map_odom = place.pose @ T_odom_base.inverse()
+        return TrackedPose(scan.stamp, place.pose, covariance, T_map_odom)
 
     def _believable(self, T_odom_base: SE2, place: Hypothesis) -> bool:
         """Tell whether a UNIQUE place may be published.
@@ -307,10 +313,6 @@ class Localizer:
         stamp, T_odom_then = self._found_nothing_at
         moved = T_odom_then.distance_to(T_odom_base) >= _MOVED_M
         return moved or not 0.0 <= scan.stamp - stamp < _PATIENCE_S
-
-    def _begin(self, belief: Particles, T_odom_base: SE2) -> None:
-        self._track = Track(start(belief), T_odom_base)
-        self._watch = Watch(self._locator, self.config.watch)
 
     def _move(self, scan: LaserScan, T_odom_base: SE2) -> Track:
         assert self._track is not None  # noqa: S101 - the states that follow have one
