@@ -55,8 +55,10 @@ def test_a_reader_that_leaves_early_is_no_error(unique: Files) -> None:
 
 def test_ctrl_c_ends_with_130_and_no_traceback(unique: Files) -> None:
     # Interrupted where it surely is at work: a signal after some seconds would be a bet.
+    # What runs in the background inherits that SIGINT is ignored: undo that first.
     script = (
-        "import _thread, sys; from firstfix.cli.app import run; "
+        "import _thread, signal, sys; from firstfix.cli.app import run; "
+        "signal.signal(signal.SIGINT, signal.default_int_handler); "
         "from firstfix.formats import map_server; "
         "map_server.load_map = lambda path: _thread.interrupt_main(); "
         f"sys.exit(run(['locate', {str(unique[0])!r}, {str(unique[1])!r}]))"
