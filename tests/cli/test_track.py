@@ -307,3 +307,13 @@ def test_a_search_that_finds_nothing_says_why(
     assert ended.status == 1
     assert "found at none of" in ended.out
     assert not Path("never.tum").exists()
+
+
+def test_the_seed_counts_for_a_search_too(cli, files: tuple[Path, Path]) -> None:
+    def track(seed: int) -> str:
+        ended = cli("track", *files, "--start", "search", "--seed", seed, "--out", "a.tum")
+        assert ended.status == 0
+        return Path("a.tum").read_text()
+
+    assert track(1) == track(1)
+    assert track(1) != track(2)

@@ -120,6 +120,11 @@ class AmclConfig:
     scan_topic: str = _setting("scan", "topic of the scans")
     map_topic: str = _setting("map", "topic of the map")
 
+    @property
+    def seed(self) -> int:
+        """Seed of all randomness: random_seed, or 0 where that is negative."""
+        return max(0, self.random_seed)
+
     def __post_init__(self) -> None:
         for entry in fields(self):
             value = _checked(

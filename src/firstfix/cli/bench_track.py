@@ -61,7 +61,7 @@ def bench_track(
         If a case cannot be used, or none has odometry.
     """
     from firstfix.cli.cases import find_cases
-    from firstfix.cli.settings import load_config, seed_of
+    from firstfix.cli.settings import load_config
     from firstfix.evaluation.track_bench import (
         TrackTask,
         run_track_tasks,
@@ -70,10 +70,10 @@ def bench_track(
     )
 
     found = find_cases(cases)
-    config = load_config(params)
+    config = load_config(params, seed)
     if json_file is not None:
         check_file(json_file)
-    tasks = [TrackTask(case, config, seed_of(config, seed)) for case in found]
+    tasks = [TrackTask(case, config, config.seed) for case in found]
     with progress(len(tasks), "bench") as done:
         runs = run_track_tasks(tasks, jobs, lambda run: done(run.case))
     _tell(runs)

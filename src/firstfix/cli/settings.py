@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,17 +10,31 @@ if TYPE_CHECKING:
     from firstfix.amcl.config import AmclConfig
 
 
-def load_config(params: Path | None) -> AmclConfig:
-    """Return the settings of a parameter file of Nav2; its defaults without one."""
+def load_config(params: Path | None, seed: int | None) -> AmclConfig:
+    """Return the settings of a parameter file of Nav2, its defaults without one.
+
+    Parameters
+    ----------
+    params : Path or None
+        The file.
+    seed : int or None
+        Takes the place of random_seed where it is given.
+
+    Returns
+    -------
+    AmclConfig
+        The settings.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used.
+    """
     from firstfix.amcl.config import AmclConfig
 
-    if params is None:
-        return AmclConfig()
-    from firstfix.formats.amcl_yaml import load_amcl_config
+    config = AmclConfig()
+    if params is not None:
+        from firstfix.formats.amcl_yaml import load_amcl_config
 
-    return load_amcl_config(params)
-
-
-def seed_of(config: AmclConfig, seed: int | None) -> int:
-    """Return the seed asked for, else that of the settings; a negative one means 0 there."""
-    return max(0, config.random_seed) if seed is None else seed
+        config = load_amcl_config(params)
+    return config if seed is None else replace(config, random_seed=seed)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from firstfix.cli.progress import progress, working
-from firstfix.cli.settings import load_config, seed_of
+from firstfix.cli.settings import load_config
 from firstfix.cli.start import WAYS, Origin, choose_start, map_key, read_start
 from firstfix.cli.targets import check_file, check_picture
 
@@ -85,7 +85,7 @@ def track(
     from firstfix.formats.map_server import load_map
     from firstfix.formats.recording import load_recording
 
-    config = load_config(params)
+    config = load_config(params, seed)
     grid = load_map(map_path)
     recording = load_recording(log, topic=topic)
 
@@ -113,7 +113,7 @@ def track(
         check_start(grid, drive.begin_at)
         with working("preparing the map"):
             tracker = make_tracker(grid, config)
-        rng = np.random.default_rng(seed_of(config, seed))
+        rng = np.random.default_rng(config.seed)
         tracked = []
         with progress(len(drive.sights), "tracking") as done:
             for scan in follow_drive(drive, tracker, config, begin.covariance, rng):

@@ -64,7 +64,7 @@ class Localizer:
         self.config = config or LocalizerConfig()
         self.state = State.NO_MAP
         self._cache_dir = cache_dir
-        self._rng = np.random.default_rng(max(0, self.config.amcl.random_seed))
+        self._rng = np.random.default_rng(self.config.amcl.seed)
         self._odometry = OdometryBuffer()
         self._waiting: LaserScan | None = None
         self._lifted: set[SignalKind] = set()
