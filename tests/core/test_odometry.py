@@ -46,3 +46,8 @@ def test_kinds_of_signals_are_found_by_their_words() -> None:
     for word in ("cliff", "wheel_drop", "picked_up", "bumper"):
         assert SignalKind(word).value == word
     assert len(SignalKind) == 4
+
+
+def test_a_bumper_does_not_mean_lifted() -> None:
+    lifting = {kind for kind in SignalKind if kind.means_lifted}
+    assert lifting == {SignalKind.CLIFF, SignalKind.WHEEL_DROP, SignalKind.PICKED_UP}

@@ -31,7 +31,6 @@ from firstfix.system.transitions import State
 # Kidnaps of one spliced drive: three such drives are a dozen.
 SPLICES = 4
 
-_LIFTING = {SignalKind.CLIFF, SignalKind.WHEEL_DROP, SignalKind.PICKED_UP}
 _UNDERWAY = {"carry", "slip"}
 _KINDS = {
     Disturbance.TELEPORTED: "teleport",
@@ -175,7 +174,7 @@ def watched(happenings: Iterable[Happening], grid: OccupancyGrid) -> Iterator[In
                 scan = event
             elif isinstance(event, Odometry):
                 T_odom_base = event.T_odom_base if scan is None else T_odom_base
-            elif event.kind in _LIFTING:
+            elif event.kind.means_lifted:
                 raised |= event.active
                 (lifted.add if event.active else lifted.discard)(event.kind)
         if scan is None:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 
 from firstfix.core.grid import OccupancyGrid
-from firstfix.core.odometry import Signal
+from firstfix.core.odometry import Signal, SignalKind
 from firstfix.evaluation.small_room import small_room
 from firstfix.evaluation.story import Scene
 from firstfix.sim.mishaps import CarryTo, Teleport
@@ -56,16 +56,17 @@ def play(grid: OccupancyGrid, seed: int, localizer: Localizer) -> Iterator[Scene
         One a scan.
     """
     localizer.handle(NewMap(0.0, grid))
-    act, lifted = 0, False
+    act = 0
+    lifted: set[SignalKind] = set()
     for moment in run(Scenario(SCRIPT), grid, seed):
         began = time.process_time()
         outputs: list[Output] = []
         for event in moment.events:
             outputs += localizer.handle(event)
-            if isinstance(event, Signal):
-                # Carried: the act begins where the first wheel loses the ground.
+            if isinstance(event, Signal) and event.kind.means_lifted:
+                # Carried: the act begins with the first sensor that notices.
                 act += event.active and not lifted
-                lifted = event.active
+                (lifted.add if event.active else lifted.discard)(event.kind)
         cpu_s = time.process_time() - began
         if moment.disturbance is Disturbance.TELEPORTED:
             act += 1
@@ -80,6 +81,6 @@ def play(grid: OccupancyGrid, seed: int, localizer: Localizer) -> Iterator[Scene
             state=localizer.state.value,
             reason=told[-1].reason if told else "",
             act=act,
-            lifted=lifted,
+            lifted=bool(lifted),
             cpu_s=cpu_s,
         )

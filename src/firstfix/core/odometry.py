@@ -42,6 +42,11 @@ class SignalKind(Enum):
     PICKED_UP = "picked_up"
     BUMPER = "bumper"
 
+    @property
+    def means_lifted(self) -> bool:
+        """True for what a robot senses that does not stand on its wheels."""
+        return self is not SignalKind.BUMPER
+
 
 @dataclass(frozen=True, slots=True)
 class Signal:

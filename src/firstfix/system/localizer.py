@@ -27,9 +27,6 @@ from firstfix.system.outputs import Hypotheses, InitialPose, Output, Status, Tra
 from firstfix.system.transitions import Event, State, after
 from firstfix.system.watch import Finding, Watch
 
-# While one of these is active the robot is not on its wheels.
-_LIFTED = {SignalKind.CLIFF, SignalKind.WHEEL_DROP, SignalKind.PICKED_UP}
-
 # The covariance of the static stage is that of one scan in a perfect map; a track begins wider.
 _BEGIN_COVARIANCE = np.diag([0.03**2, 0.03**2, np.radians(1.0) ** 2])
 
@@ -139,7 +136,7 @@ class Localizer:
         return told + self._take_waiting_scan()
 
     def _take_signal(self, given: Signal) -> list[Output]:
-        if given.kind not in _LIFTED:
+        if not given.kind.means_lifted:
             return []
         if not given.active:
             self._lifted.discard(given.kind)
