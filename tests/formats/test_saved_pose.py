@@ -13,8 +13,9 @@ from numpy.testing import assert_array_equal
 
 from firstfix.core.angles import angle_error
 from firstfix.core.errors import InputError
+from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.formats.saved_pose import MAX_POSITION_M, SavedPose, load_pose, save_pose
+from firstfix.formats.saved_pose import MAX_POSITION_M, SavedPose, load_pose, map_key, save_pose
 
 COVARIANCE = np.array([[0.04, 0.01, 0.0], [0.01, 0.09, 0.002], [0.0, 0.002, 0.01]])
 
@@ -214,3 +215,20 @@ def test_two_robots_that_share_a_file_by_mistake_leave_a_whole_pose(tmp_path):
     while any(writer.is_alive() for writer in writers):
         assert load_pose(path).map_key in {saved.map_key for saved in poses}
     assert [path.name for path in tmp_path.iterdir()] == ["pose.json"]
+
+
+def test_a_map_is_known_again_by_its_cells_and_where_they_lie():
+    cells = np.zeros((3, 4), np.int8)
+    wall = cells.copy()
+    wall[1, 2] = 100
+    origin = SE2(1.0, 2.0, 0.5)
+    grid = OccupancyGrid(cells, 0.05, origin)
+    others = [
+        OccupancyGrid(wall, 0.05, origin),
+        OccupancyGrid(cells.T, 0.05, origin),
+        OccupancyGrid(cells, 0.1, origin),
+        OccupancyGrid(cells, 0.05, SE2(1.0, 2.0, 0.6)),
+    ]
+    assert map_key(grid) == map_key(OccupancyGrid(cells.copy(), 0.05, origin))
+    assert len({map_key(each) for each in (grid, *others)}) == 5
+    assert pose(map_key=map_key(grid)).map_key == map_key(grid)

@@ -132,16 +132,6 @@ def choose_start(
     return start
 
 
-def map_key(grid: OccupancyGrid) -> str:
-    """Return what tells this map from others: its cells and where they lie."""
-    import numpy as np
-
-    from firstfix.fields.cache import content_key
-
-    place = np.append(grid.T_map_grid.as_array(), grid.resolution)
-    return content_key("map 1", grid.cells, place)
-
-
 def _true(recording: Recording, *, is_asked_for: bool) -> Start:
     import numpy as np
 
@@ -163,7 +153,7 @@ def _saved(path: Path, grid: OccupancyGrid, recording: Recording) -> Start:
     from firstfix.evaluation.drive import known_odometry
     from firstfix.evaluation.track import TRUE_START
     from firstfix.formats.recalled_pose import recall
-    from firstfix.formats.saved_pose import load_pose
+    from firstfix.formats.saved_pose import load_pose, map_key
 
     saved = load_pose(path)
     index, T_odom_base = known_odometry(recording)[0]

@@ -10,7 +10,7 @@ import typer
 
 from firstfix.cli.progress import progress, working
 from firstfix.cli.settings import load_config
-from firstfix.cli.start import WAYS, Origin, choose_start, map_key, read_start
+from firstfix.cli.start import WAYS, Origin, choose_start, read_start
 from firstfix.cli.targets import check_file, check_picture
 
 if TYPE_CHECKING:
@@ -104,6 +104,7 @@ def track(
     keeper = None
     if keep_pose is not None:
         from firstfix.cli.pose_keeper import PoseKeeper
+        from firstfix.formats.saved_pose import map_key
 
         keeper = PoseKeeper(keep_pose, map_key(grid), config.save_pose_rate)
     if begin.origin is Origin.SEARCH:

@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.errors import InputError
+from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
+from firstfix.fields.cache import content_key
 from firstfix.formats.map_files import show
 from firstfix.formats.whole_files import read_bytes, replace_file
 
@@ -45,7 +47,7 @@ class SavedPose:
     T_odom_base : SE2 or None
         Odometry at this time; None where there is none.
     map_key : str
-        Which map this is a pose in, such as `firstfix.fields.cache.content_key` of its cells.
+        Which map this is a pose in, from `map_key`.
 
     Raises
     ------
@@ -72,6 +74,23 @@ class SavedPose:
             raise _unfit(f"a key of the map, 1 to {MAX_KEY_LENGTH} characters", received)
         object.__setattr__(self, "stamp", float(self.stamp))
         object.__setattr__(self, "covariance", _checked_covariance(self.covariance))
+
+
+def map_key(grid: OccupancyGrid) -> str:
+    """Return what tells this map from others: its cells and where they lie.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+
+    Returns
+    -------
+    str
+        The same for the same map, whatever file it came from.
+    """
+    place = np.append(grid.T_map_grid.as_array(), grid.resolution)
+    return content_key("map 1", grid.cells, place)
 
 
 def save_pose(path: str | os.PathLike[str], saved: SavedPose) -> None:
@@ -129,9 +148,9 @@ def load_pose(path: str | os.PathLike[str]) -> SavedPose:
     entry = _Entries(path, document)
     odometry = None if entry.get("T_odom_base") is None else entry.pose("T_odom_base")
     pose, covariance = entry.pose("T_map_base"), entry.numbers("covariance", (3, 3))
-    stamp, map_key = float(entry.numbers("stamp", ())), entry.text("map_key")
+    stamp, key = float(entry.numbers("stamp", ())), entry.text("map_key")
     try:
-        return SavedPose(pose, covariance, stamp, odometry, map_key)
+        return SavedPose(pose, covariance, stamp, odometry, key)
     except InputError as error:
         raise _wrong(path, error.expected, error.received) from error
 
