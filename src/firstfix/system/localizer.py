@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,10 @@ _MOVED_M = 0.1
 _AS_GOOD = 1.5
 _GOOD_COST = 0.3
 
+# Odometry may lag by so many scans: a second at 40 Hz. A scan that waits alone would starve under
+# odometry that lags by more than the time from scan to scan.
+_MOST_WAITING = 40
+
 # How far a robot may be from where its track was lost and still be believed at the first word.
 _STRAYED_M = 2.0
 
@@ -63,7 +68,7 @@ class Localizer:
         self._cache_dir = cache_dir
         self._rng = np.random.default_rng(self.config.amcl.seed)
         self._odometry = OdometryBuffer()
-        self._waiting: LaserScan | None = None
+        self._waiting: deque[LaserScan] = deque(maxlen=_MOST_WAITING)
         self._lifted: set[SignalKind] = set()
         self._found_nothing_at: tuple[float, SE2] | None = None
         self._update_asked = False
@@ -91,7 +96,7 @@ class Localizer:
         given : Input
             A map, scan, odometry message, signal of the base, hint or request. Scans and odometry
             may come in any order as long as each kind is in the order of its stamps: a scan waits
-            until odometry reaches its stamp, and gives way to a newer one.
+            until odometry reaches its stamp; if it reaches several at once, the newest is used.
 
         Returns
         -------
@@ -112,7 +117,7 @@ class Localizer:
         if self.state is State.NO_MAP:
             return [Status(given.stamp, self.state, "no map yet")]
         if isinstance(given, LaserScan):
-            self._waiting = given
+            self._waiting.append(given)
             return self._take_waiting_scan()
         if isinstance(given, PoseHint):
             return self._take_hint(given)
@@ -131,16 +136,17 @@ class Localizer:
 
     def _take_odometry(self, given: Odometry) -> list[Output]:
         before = self._odometry.last
-        jumped = self._odometry.add(given)
-        told = self._follow_jump(before, given) if jumped else []
-        return told + self._take_waiting_scan()
+        if not self._odometry.add(given):
+            return self._take_waiting_scan()
+        self._waiting.clear()  # of the clock or the frame before
+        return self._follow_jump(before, given)
 
     def _take_signal(self, given: Signal) -> list[Output]:
         if not given.kind.means_lifted:
             return []
         if not given.active:
             self._lifted.discard(given.kind)
-            self._waiting = None  # taken in somebody's hands
+            self._waiting.clear()  # taken in somebody's hands
             return []
         self._lifted.add(given.kind)
         if self.state is State.NO_MAP:
@@ -160,12 +166,13 @@ class Localizer:
         return [Status(given.stamp, self.state, "the next scan will be used in any case")]
 
     def _take_waiting_scan(self) -> list[Output]:
-        scan, last = self._waiting, self._odometry.last
-        if scan is None or last is None or self.state is State.NO_MAP:
+        last, scan = self._odometry.last, None
+        if last is None or self.state is State.NO_MAP:
             return []
-        if scan.stamp > last.stamp:
+        while self._waiting and self._waiting[0].stamp <= last.stamp:
+            scan = self._waiting.popleft()
+        if scan is None:
             return []
-        self._waiting = None
         T_odom_base = self._odometry.at(scan.stamp)
         if T_odom_base is None:
             reason = "a scan is older than the odometry that is known: left out"
@@ -328,7 +335,7 @@ class Localizer:
         self._candidates.clear()
         self._track = None
         self._hint = None
-        self._waiting = None
+        self._waiting.clear()
         self.state = after(self.state, event)
         return Status(stamp, self.state, reason, evidence)
 
