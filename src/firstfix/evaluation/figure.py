@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from firstfix.core.errors import InputError
 
@@ -16,6 +20,8 @@ SUFFIXES = (".png", ".svg", ".pdf")
 BLUE, ORANGE, GREEN = "#0072B2", "#E69F00", "#009E73"
 RED, PURPLE, SKY = "#D55E00", "#CC79A7", "#56B4E9"
 PALETTE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY)
+# Once all colours are taken, they come again in another dash.
+_DASHES = ("-", "--", "-.", ":")
 
 
 def check_path(path: Path) -> None:
@@ -32,6 +38,38 @@ def check_path(path: Path) -> None:
             received=f"{path}",
             remedy="name the file by its format, such as place.png",
         )
+
+
+def line_style(number: int) -> dict[str, Any]:
+    """Return colour and dash of the line of a number from 0, as keywords of matplotlib."""
+    return {
+        "color": PALETTE[number % len(PALETTE)],
+        "ls": _DASHES[number // len(PALETTE) % len(_DASHES)],
+    }
+
+
+def share_curve(
+    values: Sequence[float], least: float, most: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return which share of some values is at most so large, as the corners of a step curve.
+
+    Parameters
+    ----------
+    values : sequence of float
+        At least one; inf where there is none, so that the curve stays below 1.
+    least, most : float
+        Ends of the axis.
+
+    Returns
+    -------
+    tuple of ndarray, shape (n + 2,)
+        Values of the n that are finite, and shares from 0 to 1; a corner at each end of the axis.
+    """
+    ordered = np.sort(values)
+    share = np.arange(1, len(ordered) + 1) / len(ordered)
+    known = np.isfinite(ordered)
+    x = np.concatenate([[least], np.clip(ordered[known], least, most), [most]])
+    return x, np.concatenate([[0.0], share[known], [known.mean()]])
 
 
 def can_draw() -> bool:

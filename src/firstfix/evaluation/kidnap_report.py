@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from firstfix.core.errors import InputError
-from firstfix.evaluation.figure import PALETTE, new_figure, save_figure
+from firstfix.evaluation.figure import line_style, new_figure, save_figure, share_curve
 from firstfix.evaluation.kidnap_bench import KidnapRun, kidnap_table, kinds_table
+from firstfix.evaluation.page import write_page
 
 LEGEND = (
     "Detected: the old pose was given up within 3 s of useful scans; delay: median time until "
@@ -22,7 +22,6 @@ LEGEND = (
 
 # Times are shown on a logarithmic axis between these, s.
 LEAST_S, MOST_S = 0.05, 30.0
-_LINES = ("-", "--", "-.", ":")
 
 
 def write_kidnap_report(runs: Sequence[KidnapRun], document: dict[str, Any], folder: Path) -> Path:
@@ -48,16 +47,7 @@ def write_kidnap_report(runs: Sequence[KidnapRun], document: dict[str, Any], fol
         If it cannot be written, or matplotlib is not installed.
     """
     save_recovery_curves(runs, folder / "time_to_recover.png")
-    page = folder / "report.md"
-    try:
-        page.write_text(_page(document), encoding="utf-8")
-    except OSError as error:
-        raise InputError(
-            expected="a folder where a report can be written",
-            received=f"{folder} ({error.strerror})",
-            remedy="choose another folder",
-        ) from None
-    return page.resolve()
+    return write_page(_parts(document), folder)
 
 
 def save_recovery_curves(runs: Sequence[KidnapRun], path: Path) -> Path:
@@ -75,13 +65,8 @@ def save_recovery_curves(runs: Sequence[KidnapRun], path: Path) -> Path:
         ]
         if not times:
             continue
-        share = np.arange(1, len(times) + 1) / len(times)
-        known = np.isfinite(np.sort(times))
-        x = np.concatenate([[LEAST_S], np.clip(np.sort(times)[known], LEAST_S, MOST_S), [MOST_S]])
-        y = np.concatenate([[0.0], share[known], [known.mean()]])
-        colour = PALETTE[number % len(PALETTE)]
-        style = _LINES[number // len(PALETTE) % len(_LINES)]
-        axes.step(x, y, where="post", color=colour, ls=style, label=f"{world} ({len(times)})")
+        x, y = share_curve(times, LEAST_S, MOST_S)
+        axes.step(x, y, where="post", **line_style(number), label=f"{world} ({len(times)})")
     axes.set(xscale="log", xlim=(LEAST_S, MOST_S), ylim=(0.0, 1.02))
     axes.set(xlabel="time after the first useful scan, s", ylabel="share of kidnaps recovered")
     axes.grid(which="both", alpha=0.25)
@@ -90,7 +75,7 @@ def save_recovery_curves(runs: Sequence[KidnapRun], path: Path) -> Path:
     return save_figure(figure, path)
 
 
-def _page(document: dict[str, Any]) -> str:
+def _parts(document: dict[str, Any]) -> list[str]:
     parts = ["# firstfix bench --kidnap", LEGEND, kidnap_table(document), kinds_table(document)]
     if document["left_out"]:
         parts += [f"Left out: {row['name']} ({row['why']})." for row in document["left_out"]]
@@ -98,7 +83,7 @@ def _page(document: dict[str, Any]) -> str:
     parts += ["## What to look at", *(_incident(row) for row in document["incidents"])]
     if not document["incidents"]:
         parts.append("Nothing.")
-    return "\n\n".join(part.strip() for part in parts) + "\n"
+    return parts
 
 
 def _incident(row: dict[str, Any]) -> str:

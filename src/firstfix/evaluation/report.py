@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from firstfix.core.errors import InputError
-from firstfix.evaluation.figure import PALETTE, new_figure, save_figure
+from firstfix.evaluation.figure import PALETTE, line_style, new_figure, save_figure, share_curve
 from firstfix.evaluation.outcome import FOUND
+from firstfix.evaluation.page import write_page
 from firstfix.evaluation.runs import CaseRun
 from firstfix.evaluation.tables import bench_table, foreign_table
 from firstfix.global_localization.config import Method
@@ -25,7 +25,6 @@ LEGEND = (
     "Unique, right and wrong: verdict UNIQUE, of these right (share) and wrong (count). "
     "Errors are those of the successes. Times are of `locate` alone, one scan."
 )
-LINES = ("-", "--", "-.", ":")
 
 
 def write_report(runs: Sequence[CaseRun], document: dict[str, Any], folder: Path) -> Path:
@@ -52,16 +51,7 @@ def write_report(runs: Sequence[CaseRun], document: dict[str, Any], folder: Path
     """
     save_error_curves(runs, folder / "error_curves.png")
     save_times(runs, folder / "time_by_area.png")
-    page = folder / "report.md"
-    try:
-        page.write_text(_page(document), encoding="utf-8")
-    except OSError as error:
-        raise InputError(
-            expected="a folder where a report can be written",
-            received=f"{folder} ({error.strerror})",
-            remedy="choose another folder",
-        ) from None
-    return page.resolve()
+    return write_page(_parts(document), folder)
 
 
 def save_error_curves(runs: Sequence[CaseRun], path: Path) -> Path:
@@ -118,21 +108,16 @@ def save_times(runs: Sequence[CaseRun], path: Path) -> Path:
 
 
 def _error_curve(axes: Axes, run: CaseRun, number: int) -> None:
-    errors = np.sort([outcome.error.metres for outcome in run.outcomes])
-    share = np.arange(1, len(errors) + 1) / len(errors)
-    known = np.isfinite(errors)
-    x = np.concatenate([[LEAST_M], np.clip(errors[known], LEAST_M, MOST_M), [MOST_M]])
-    y = np.concatenate([[0.0], share[known], [known.mean()]])
-    colour = PALETTE[number % len(PALETTE)]
-    style = LINES[number // len(PALETTE) % len(LINES)]
-    axes.step(x, y, where="post", color=colour, ls=style, lw=1.3, label=run.case)
+    errors = [outcome.error.metres for outcome in run.outcomes]
+    x, y = share_curve(errors, LEAST_M, MOST_M)
+    axes.step(x, y, where="post", **line_style(number), lw=1.3, label=run.case)
 
 
 def _methods(runs: Sequence[CaseRun]) -> list[Method]:
     return list(dict.fromkeys(run.method for run in runs))
 
 
-def _page(document: dict[str, Any]) -> str:
+def _parts(document: dict[str, Any]) -> list[str]:
     parts = [
         "# firstfix bench",
         LEGEND,
@@ -146,4 +131,4 @@ def _page(document: dict[str, Any]) -> str:
         "## Time",
         "![CPU time by free area](time_by_area.png)",
     ]
-    return "\n\n".join(part.strip() for part in parts) + "\n"
+    return parts
