@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from firstfix.core.errors import InputError
+from firstfix.formats.whole_files import write_whole
 
 
 def check_file(path: Path) -> None:
@@ -52,11 +53,9 @@ def check_plots() -> None:
 
 def write_json(document: dict[str, Any], path: Path) -> None:
     """Write a document, all or nothing."""
+    text = json.dumps(document, indent=2, allow_nan=False)
     with _writing(path):
-        text = json.dumps(document, indent=2, allow_nan=False)
-        draft = path.with_name(f".{path.name}.draft")
-        draft.write_text(text + "\n", encoding="utf-8")
-        draft.replace(path)
+        write_whole(path, [text.encode(), b"\n"])
 
 
 @contextmanager
