@@ -24,11 +24,11 @@ from firstfix.amcl.initial import around_hypotheses, around_pose, over_free_spac
 from firstfix.amcl.particles import Particles
 from firstfix.amcl.sensor import build_sensor
 from firstfix.amcl.track import Track, Tracker
-from firstfix.core.angles import angle_error
 from firstfix.core.estimate import Hypothesis, Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.evaluation.drive import Sight, plan_drive
+from firstfix.evaluation.outcome import is_found
 from firstfix.evaluation.track import TRUE_START
 from firstfix.formats.map_server import load_map
 from firstfix.formats.recording import load_recording
@@ -71,7 +71,9 @@ def tried(folder: Path, arguments: argparse.Namespace) -> list[int]:
             continue
         result = locator.locate(drive[0].scan)
         wanted = arguments.all or result.verdict is Verdict.AMBIGUOUS
-        if not wanted or not any(near(place.pose, drive[0].truth) for place in result.hypotheses):
+        if not wanted or not any(
+            is_found(place.pose, drive[0].truth) for place in result.hypotheses
+        ):
             continue
         counts[0] += 1
         for k, belief in enumerate(beginnings(result.hypotheses, drive[0]), 1):
@@ -104,7 +106,7 @@ def won(
     track = Track(start(begin(rng)), drive[0].T_odom_base)
     for sight in drive[1:]:
         track = tracker.follow(track, sight.T_odom_base, sight.scan, rng)
-    return near(track.T_map_odom @ drive[-1].T_odom_base, drive[-1].truth)
+    return is_found(track.T_map_odom @ drive[-1].T_odom_base, drive[-1].truth)
 
 
 def next_metres(sights: tuple[Sight, ...]) -> tuple[Sight, ...]:
@@ -125,12 +127,6 @@ def shortened(scan: LaserScan, reach: float) -> LaserScan:
         return scan
     ranges = np.where(scan.ranges >= reach, np.float32(np.inf), scan.ranges)
     return replace(scan, ranges=ranges, range_max=reach)
-
-
-def near(pose: SE2, truth: SE2 | None) -> bool:
-    return truth is not None and (
-        pose.distance_to(truth) < 0.5 and angle_error(pose.yaw, truth.yaw) < np.radians(10.0)
-    )
 
 
 if __name__ == "__main__":

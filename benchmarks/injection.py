@@ -24,11 +24,11 @@ from firstfix.amcl.filter import Injection
 from firstfix.amcl.initial import around_pose, free_poses, hypothesis_poses
 from firstfix.amcl.sensor import Sensor, build_sensor
 from firstfix.amcl.track import Tracker
-from firstfix.core.angles import angle_error
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.evaluation.drive import Sight, plan_drive
+from firstfix.evaluation.outcome import is_found
 from firstfix.evaluation.track import TRUE_START
 from firstfix.formats.map_server import load_map
 from firstfix.formats.recording import load_recording
@@ -93,17 +93,11 @@ def time_to_recover(
     for sight in after:
         T_odom_base = carried @ sight.T_odom_base
         track = tracker.follow(track, T_odom_base, sight.scan, rng)
-        if not near(track.T_map_odom @ T_odom_base, sight.truth):
+        if not is_found(track.T_map_odom @ T_odom_base, sight.truth):
             since = None
         elif since is None:
             since = sight.scan.stamp - landed
     return since
-
-
-def near(pose: SE2, truth: SE2 | None) -> bool:
-    return truth is not None and (
-        pose.distance_to(truth) < 0.5 and angle_error(pose.yaw, truth.yaw) < np.radians(10.0)
-    )
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import pytest
 
 from firstfix.core.estimate import Verdict
 from firstfix.core.se2 import SE2
-from firstfix.evaluation.outcome import FOUND, NO_POSE, PoseError, judge
+from firstfix.evaluation.outcome import FOUND, NO_POSE, PoseError, is_found, judge
 
 TRUTH = SE2(1.0, 2.0, math.pi)
 
@@ -21,6 +21,12 @@ def test_both_parts_must_be_below_the_tolerance() -> None:
     assert PoseError(0.499, math.radians(9.9)).is_within(FOUND)
     for error in (PoseError(0.5, 0.0), PoseError(0.0, math.radians(10.0)), NO_POSE):
         assert not error.is_within(FOUND)
+
+
+def test_a_pose_is_found_where_the_truth_is_and_is_known() -> None:
+    assert is_found(TRUTH @ SE2(0.4, 0.0, 0.1), TRUTH)
+    assert not is_found(TRUTH @ SE2(0.6, 0.0, 0.0), TRUTH)
+    assert not is_found(TRUTH, None)
 
 
 def test_rank_is_that_of_the_first_right_hypothesis(answer) -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from firstfix.core.se2 import SE2
-from firstfix.evaluation.story import Act, Scene, is_right, tell_acts
+from firstfix.evaluation.story import Act, Scene, tell_acts
 
 HERE, ELSEWHERE = SE2(1.0, 2.0, 0.5), SE2(7.0, 2.0, 0.5)
 
@@ -33,7 +33,7 @@ def one_act(*scenes: Scene) -> Act:
     ],
 )
 def test_right_is_half_a_metre_and_ten_degrees(off: SE2, *, right: bool) -> None:
-    assert is_right(HERE @ off, HERE) is right
+    assert scene(0.0, HERE @ off).is_right is right
 
 
 def test_a_robot_that_is_found_at_once_and_followed() -> None:

@@ -71,6 +71,11 @@ class Outcome:
         return self.error.is_within(FOUND)
 
 
+def is_found(pose: SE2, truth: SE2 | None) -> bool:
+    """Tell whether a pose is within `FOUND` of the truth; False where the truth is not known."""
+    return truth is not None and PoseError.between(pose, truth).is_within(FOUND)
+
+
 def judge(result: LocateResult, truth: SE2, *, index: int, cpu_s: float, wall_s: float) -> Outcome:
     """Compare an answer with the truth, whatever its verdict.
 

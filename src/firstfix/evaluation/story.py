@@ -8,12 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firstfix.core.angles import angle_error
 from firstfix.core.se2 import SE2
-
-# As everywhere: a pose is right within these of the truth.
-RIGHT_M = 0.5
-RIGHT_RAD = math.radians(10.0)
+from firstfix.evaluation.outcome import PoseError, is_found
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +51,7 @@ class Scene:
     @property
     def is_right(self) -> bool:
         """True if a pose was published, and the truth is there."""
-        return self.published is not None and is_right(self.published, self.truth)
+        return self.published is not None and is_found(self.published, self.truth)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,11 +109,6 @@ def tell_acts(scenes: Sequence[Scene]) -> list[Act]:
     return [_tell([scene for scene in scenes if scene.act == number]) for number in numbers]
 
 
-def is_right(pose: SE2, truth: SE2) -> bool:
-    """Tell whether a pose is within 0.5 m and 10 degrees of the truth."""
-    return pose.distance_to(truth) <= RIGHT_M and angle_error(pose.yaw, truth.yaw) <= RIGHT_RAD
-
-
 def _tell(scenes: list[Scene]) -> Act:
     standing = [scene for scene in scenes if not scene.lifted]
     seeing = standing or scenes
@@ -126,14 +117,12 @@ def _tell(scenes: list[Scene]) -> Act:
     found = next((i for i, scene in enumerate(seeing) if scene.is_right), None)
     after = seeing[found:] if found is not None else []
     off = [
-        (
-            scene.published.distance_to(scene.truth),
-            angle_error(scene.published.yaw, scene.truth.yaw),
-        )
+        PoseError.between(scene.published, scene.truth)
         for scene in after
         if scene.published is not None
     ]
-    metres, degrees = np.array(off).reshape(-1, 2).T * [[1.0], [math.degrees(1.0)]]
+    metres = np.array([error.metres for error in off])
+    degrees = np.array([error.radians for error in off]) * math.degrees(1.0)
     return Act(
         began_s=began,
         noticed_s=given_up[0].stamp - began if given_up else None,
@@ -141,7 +130,7 @@ def _tell(scenes: list[Scene]) -> Act:
         found_error_m=float(metres[0]) if len(metres) else math.nan,
         found_error_deg=float(degrees[0]) if len(degrees) else math.nan,
         wrong_finds=sum(
-            scene.initial is not None and not is_right(scene.initial, scene.truth)
+            scene.initial is not None and not is_found(scene.initial, scene.truth)
             for scene in scenes
         ),
         kept=sum(scene.is_right for scene in after) / len(after) if after else math.nan,
