@@ -15,11 +15,12 @@ from firstfix.core.recording import Recording
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.evaluation.case import Case, truth_at
-from firstfix.evaluation.kidnap import LEAST_HITS, SLIP, Instant
+from firstfix.evaluation.kidnap import SLIP, Instant
 from firstfix.evaluation.kidnap_bench import KidnapRun, judged_run
 from firstfix.evaluation.small_room import scan_of, small_room
 from firstfix.evaluation.splice import Unfit, splice
 from firstfix.fields.cache import cache_folder
+from firstfix.global_localization.beams import FEWEST_HITS
 from firstfix.sim.scenario import Scenario, run
 from firstfix.sim.stage import Disturbance, Moment
 from firstfix.sim.world import WORLDS
@@ -184,7 +185,7 @@ def watched(happenings: Iterable[Happening], grid: OccupancyGrid) -> Iterator[In
             stamp=scan.stamp,
             truth=happening.truth,
             T_odom_base=T_odom_base,
-            useful=not lifted and int(scan.hit.sum()) >= LEAST_HITS,
+            useful=not lifted and int(scan.hit.sum()) >= FEWEST_HITS,
             disturbed=happening.disturbed,
             over=happening.over,
             signalled=raised,

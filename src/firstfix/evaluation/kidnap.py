@@ -19,7 +19,6 @@ NEAR = PoseError(0.5, math.radians(20.0))
 
 DETECTED_WITHIN_S = 3.0
 SLOW_S = 3.0
-LEAST_HITS = 8
 
 SLIP = "slip"
 """The disturbance that is none of a kidnapper, however far it goes."""
@@ -40,7 +39,8 @@ class Instant:
     T_odom_base : SE2
         Odometry at the scan.
     useful : bool
-        True if the robot stands on its wheels and at least `LEAST_HITS` beams hit something.
+        True if the robot stands on its wheels and at least `global_localization.beams.FEWEST_HITS`
+        beams hit something.
     disturbed : bool
         True while something is being done to the robot.
     over : str or None
