@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from firstfix.adapters.replay import replay
 from firstfix.cli.kidnap_scripts import scripted
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Odometry, Signal, SignalKind
@@ -166,18 +167,17 @@ def watched(happenings: Iterable[Happening], grid: OccupancyGrid) -> Iterator[In
         outputs: list[Output] = []
         scan: LaserScan | None = None
         raised = False
-        cpu_s = 0.0
-        for event in happening.events:
-            began = time.process_time()
-            outputs += localizer.handle(event)
-            cpu_s += time.process_time() - began
+        began = time.process_time()
+        for event, answers in replay(iter(happening.events), localizer):
+            outputs += answers
             if isinstance(event, LaserScan):
                 scan = event
             elif isinstance(event, Odometry):
                 T_odom_base = event.T_odom_base if scan is None else T_odom_base
-            elif event.kind.means_lifted:
+            elif isinstance(event, Signal) and event.kind.means_lifted:
                 raised |= event.active
                 (lifted.add if event.active else lifted.discard)(event.kind)
+        cpu_s = time.process_time() - began
         if scan is None:
             continue
         tracked = [output for output in outputs if isinstance(output, TrackedPose)]

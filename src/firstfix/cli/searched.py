@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from firstfix.adapters.replay import recorded_inputs
+from firstfix.adapters.replay import recorded_inputs, replay
 from firstfix.amcl.config import AmclConfig
 from firstfix.core.errors import FirstfixError
 from firstfix.core.grid import OccupancyGrid
@@ -57,9 +57,8 @@ def search_and_follow(
     localizer.handle(NewMap(recording.scans[0].stamp, grid))
     tracked: list[TrackedScan] = []
     reason, cpu_s = "no scan has odometry at its stamp", 0.0
-    for given in recorded_inputs(recording):
-        began = time.process_time()
-        outputs = localizer.handle(given)
+    began = time.process_time()
+    for given, outputs in replay(recorded_inputs(recording), localizer):
         cpu_s += time.process_time() - began
         reason = next((o.reason for o in reversed(outputs) if isinstance(o, Status)), reason)
         for output in outputs:
@@ -79,6 +78,7 @@ def search_and_follow(
                 cpu_s = 0.0
         if isinstance(given, LaserScan):
             done(localizer.state.value)
+        began = time.process_time()
     if not tracked:
         raise NeverFoundError(f"found at none of {len(recording)} scans: {reason}")
     return Drive(

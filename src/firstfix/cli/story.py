@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 
+from firstfix.adapters.replay import replay
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Signal, SignalKind
 from firstfix.evaluation.small_room import small_room
@@ -61,8 +62,8 @@ def play(grid: OccupancyGrid, seed: int, localizer: Localizer) -> Iterator[Scene
     for moment in run(Scenario(SCRIPT), grid, seed):
         began = time.process_time()
         outputs: list[Output] = []
-        for event in moment.events:
-            outputs += localizer.handle(event)
+        for event, answers in replay(iter(moment.events), localizer):
+            outputs += answers
             if isinstance(event, Signal) and event.kind.means_lifted:
                 # Carried: the act begins with the first sensor that notices.
                 act += event.active and not lifted
