@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.errors import MapError
-from firstfix.core.estimate import LocateResult, SearchReport, Verdict
+from firstfix.core.estimate import Hypothesis, LocateResult, SearchReport, Verdict
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.fields.search_grid import SPACING_M
+from firstfix.global_localization.verify import Verification
 
 
 def check_searchable(grid: OccupancyGrid) -> None:
@@ -105,3 +106,41 @@ def to_map(
     lever[:2, 2] = -(T_map_base.y - T_map_laser.y), T_map_base.x - T_map_laser.x
     J = lever @ grid.T_map_grid.rotation_jacobian() @ scale
     return T_map_base, J @ covariance @ J.T
+
+
+def verified_place(
+    grid: OccupancyGrid,
+    scan: LaserScan,
+    verification: Verification,
+    i: int,
+    covariance: NDArray[np.float64],
+    probability: float,
+) -> Hypothesis:
+    """Bring a pose that was verified to a hypothesis in the map.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+    scan : LaserScan
+        Knows where the sensor sits.
+    verification : Verification
+        Of several poses.
+    i : int
+        Which of them it is.
+    covariance : ndarray, shape (3, 3)
+        Of x, y (cells), heading (rad) of the sensor in the grid.
+    probability : float
+        That it is the right place, 0 to 1.
+
+    Returns
+    -------
+    Hypothesis
+        For ``T_map_base``.
+    """
+    return Hypothesis(
+        *to_map(grid, scan, verification.poses[i], covariance),
+        score=float(verification.scores[i]),
+        probability=probability,
+        evidence=verification.evidence(i),
+    )

@@ -13,11 +13,11 @@ from firstfix.core.estimate import Hypothesis
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
-from firstfix.global_localization.answer import to_cells, to_map
+from firstfix.global_localization.answer import to_cells, verified_place
 from firstfix.global_localization.beams import Beams, usable_beams
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.verdict import place_probabilities
-from firstfix.global_localization.verify import verify
+from firstfix.global_localization.verify import Verification, verify
 
 # Refinement may mend what a tracker leaves open, not find another place.
 _SAME_PLACE_M = 0.3
@@ -55,18 +55,13 @@ def examine(scan: LaserScan, poses: Sequence[SE2], fields: MapFields) -> tuple[H
     given = np.array([to_cells(fields.grid, scan, pose) for pose in poses])
     refined = _held(refine_on_field(given, beams, fields), given, fields.grid.resolution)
     verification = verify(np.concatenate([refined, given]), beams, fields)
+    unsaid = np.zeros((3, 3))
     n = len(given)
     better = np.where(
         verification.scores[:n] < verification.scores[n:], np.arange(n), np.arange(n) + n
     )
-    both = np.concatenate([refined, given])
     return tuple(
-        Hypothesis(
-            *to_map(fields.grid, scan, both[i], np.zeros((3, 3))),
-            score=float(verification.scores[i]),
-            probability=_alone(float(verification.scores[i]), beams),
-            evidence=verification.evidence(i),
-        )
+        verified_place(fields.grid, scan, verification, i, unsaid, _alone(verification, i, beams))
         for i in better.tolist()
     )
 
@@ -96,19 +91,15 @@ def locate_near(scan: LaserScan, T_map_base: SE2, fields: MapFields) -> Hypothes
     poses = poses[np.argsort(first, kind="stable")[:_SECOND_LOOK]]
     best = poses[[int(np.argmin(verify(poses, beams, fields).scores))]]
     on_rays, covariances = refine_on_rays(best, beams, fields)
-    both = np.concatenate([on_rays, best])
-    verification = verify(both, beams, fields)
+    verification = verify(np.concatenate([on_rays, best]), beams, fields)
     i = int(np.argmin(verification.scores))
-    return Hypothesis(
-        *to_map(fields.grid, scan, both[i], covariances[0]),
-        score=float(verification.scores[i]),
-        probability=_alone(float(verification.scores[i]), beams),
-        evidence=verification.evidence(i),
-    )
+    probability = _alone(verification, i, beams)
+    return verified_place(fields.grid, scan, verification, i, covariances[0], probability)
 
 
-def _alone(score: float, beams: Beams) -> float:
-    return float(place_probabilities(np.array([score]), len(beams))[0])
+def _alone(verification: Verification, i: int, beams: Beams) -> float:
+    """Return the probability of a place against a wrong map, as if there were no other."""
+    return float(place_probabilities(verification.scores[[i]], len(beams))[0])
 
 
 def _held(

@@ -19,7 +19,7 @@ from firstfix.global_localization.answer import (
     check_positions,
     check_searchable,
     nothing_to_match,
-    to_map,
+    verified_place,
 )
 from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
 from firstfix.global_localization.config import LocateConfig, Method
@@ -170,12 +170,7 @@ def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateRe
     probabilities = place_probabilities(verification.scores[ranked], len(beams))
 
     hypotheses = tuple(
-        Hypothesis(
-            *to_map(fields.grid, scan, poses[i], covariances[i]),
-            score=float(verification.scores[i]),
-            probability=float(probability),
-            evidence=verification.evidence(i),
-        )
+        verified_place(fields.grid, scan, verification, int(i), covariances[i], float(probability))
         for i, probability in zip(ranked, probabilities, strict=True)
     )
     verdict, reason = _judge(verification, ranked, probabilities, report, config)

@@ -43,12 +43,15 @@ class Verification:
 
     Parameters
     ----------
+    poses : ndarray, shape (n, 3)
+        x, y (cells), heading (rad) of the sensor in the grid.
     scores : ndarray, shape (n,)
         Weighted mean cost of a beam, nats; lower is better.
     counts : ndarray of int64, shape (n, 4)
         Beams explained, short, through a wall, in unknown space.
     """
 
+    poses: NDArray[np.float64]
     scores: NDArray[np.float64]
     counts: NDArray[np.int64]
 
@@ -74,7 +77,7 @@ def verify(poses: NDArray[np.float64], beams: Beams, fields: MapFields) -> Verif
     Returns
     -------
     Verification
-        Costs and evidence, in the order of the poses.
+        Poses with costs and evidence, in their order.
     """
     used = beams.thinned(BEAMS)
     # Neighbours on a near wall repeat one another, far beams each see something else: between
@@ -98,7 +101,7 @@ def verify(poses: NDArray[np.float64], beams: Beams, fields: MapFields) -> Verif
         scores,
         counts,
     )
-    return Verification(scores, counts)
+    return Verification(poses, scores, counts)
 
 
 @njit(cache=True, nogil=True)
