@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from firstfix.amcl import likelihood_field
 from firstfix.amcl.beams import Beams, choose_beams
 from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.amcl.likelihood_field import LikelihoodField, likelihoods
@@ -233,6 +234,24 @@ def test_beams_that_few_explain_are_left_out():
     # If that many would go, it is the belief that is wrong.
     assert skipping(grid, beam_skip_error_threshold=0.3) == (30, 30)
     assert skipping(grid, beam_skip_error_threshold=0.4) == (30, 20)
+
+
+def test_what_explains_a_beam_is_told_once_not_for_every_scan(monkeypatch):
+    """It is as large as the map."""
+    count, seen = likelihood_field._count_values, []
+
+    def spy(*arguments):
+        seen.append(arguments[6])
+        count(*arguments)
+
+    monkeypatch.setattr(likelihood_field, "_count_values", spy)
+    grid, config = drawn(), AmclConfig(laser_model_type=PROB, do_beamskip=True)
+    field = LikelihoodField(grid, config)
+    for seed in (1, 2):
+        field.log_likelihood(somewhere(grid, 50, seed), choose_beams(scan_of(30, seed), config))
+    assert seen[0] is seen[1]
+    assert seen[0].size == field.squares.size
+    assert not seen[0].flags.writeable
 
 
 def test_beams_are_skipped_by_one_model_only():

@@ -44,6 +44,9 @@ class LikelihoodField:
         self.limit = max(1, min(MAX_LIMIT, limit))
         self.squares = _labelled_squares(grid, self.limit, config)
         self._values = (math.nan, np.empty(0, np.int32))
+        prob = config.laser_model_type is SensorModel.LIKELIHOOD_FIELD_PROB
+        # As large as the map: not for those who skip nothing, and not anew for every scan.
+        self._explained = self._near_walls() if prob and config.do_beamskip else None
 
     def log_likelihood(self, particles: Particles, beams: Beams) -> tuple[NDArray[np.float64], int]:
         """Judge every particle by a scan.
@@ -63,8 +66,8 @@ class LikelihoodField:
         """
         poses = _in_cells(particles, self.grid)
         hits = beams.hits / self.grid.resolution
-        if self.config.laser_model_type is SensorModel.LIKELIHOOD_FIELD_PROB:
-            hits = self._unskipped(poses, hits)
+        if self._explained is not None and len(hits) > 0:
+            hits = self._unskipped(poses, hits, self._explained)
         sums = np.zeros(len(particles), np.int32)
         _sum_values(*poses, *_columns(hits), self._table(beams.range_max), *self._shape, sums)
         return sums.astype(np.float64) * _UNIT, len(hits)
@@ -86,18 +89,22 @@ class LikelihoodField:
             kept = self._values = (range_max, table)
         return kept[1]
 
-    def _unskipped(self, poses: Poses, hits: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _near_walls(self) -> NDArray[np.int32]:
+        """Return 1 for each cell that explains an end point, else 0; flat."""
+        near = min(self.limit, self.config.beam_skip_distance / self.grid.resolution) ** 2
+        explained = np.arange(int(self.squares.max()) + 1) < near
+        table: NDArray[np.int32] = explained.astype(np.int32)[self.squares].ravel()
+        table.flags.writeable = False
+        return table
+
+    def _unskipped(
+        self, poses: Poses, hits: NDArray[np.float64], explained: NDArray[np.int32]
+    ) -> NDArray[np.float64]:
         """Leave out the beams that too few particles explain; keep all if too many would go."""
-        config = self.config
-        if not config.do_beamskip or len(hits) == 0:
-            return hits
-        near = min(self.limit, config.beam_skip_distance / self.grid.resolution) ** 2
-        explained = (np.arange(int(self.squares.max()) + 1) < near).astype(np.int32)
         counts = np.zeros(len(hits), np.int64)
-        flat = explained[self.squares].ravel()
-        _count_values(*poses, *_columns(hits), flat, *self._shape, counts)
-        keep = counts / len(poses[0]) > config.beam_skip_threshold
-        return hits if (~keep).mean() >= config.beam_skip_error_threshold else hits[keep]
+        _count_values(*poses, *_columns(hits), explained, *self._shape, counts)
+        keep = counts / len(poses[0]) > self.config.beam_skip_threshold
+        return hits if (~keep).mean() >= self.config.beam_skip_error_threshold else hits[keep]
 
 
 def likelihoods(
