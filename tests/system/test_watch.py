@@ -125,11 +125,13 @@ def test_contradiction_must_last(watch, absurd):
     assert any(finding is Finding.CONTRADICTED for _, finding in findings)
 
 
-def test_one_good_scan_ends_a_contradiction(watch, absurd, seen):
+@pytest.mark.parametrize("off", [SE2.identity(), SE2(0.2, 0.0, 0.0)])
+def test_one_good_scan_ends_a_contradiction(watch, absurd, seen, off):
+    """Also where the track is a little off, and would be put right by a second one."""
     for k in range(60):
         good = k % 18 == 17
         scan = seen(HERE, 0.1 * k) if good else absurd(0.1 * k)
-        finding = watch.look(scan, ODOM, HERE).finding
+        finding = watch.look(scan, ODOM, HERE @ off).finding
         assert finding is (Finding.FITS if good else Finding.DOUBTFUL)
 
 

@@ -96,6 +96,7 @@ class Watch:
         if np.count_nonzero(usable_beams(scan).hit) < FEWEST_HITS:
             return Look(Finding.SILENT, tracked)  # a hand before the sensor is no evidence
         if tracked.score <= self._config.doubtful_cost:
+            self._contradicted_since = None
             if self._is_off(tracked.pose, T_map_base):
                 # A small slip at rest: nothing else would put the track right.
                 scans = self._candidates.count(tracked.pose, T_odom_base)
