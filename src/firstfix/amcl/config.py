@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from enum import Enum
-from typing import Any
 
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
+from firstfix.core.settings import check_settings, setting
 
 
 class MotionModel(Enum):
@@ -27,15 +26,6 @@ class SensorModel(Enum):
     BEAM = "beam"
 
 
-# Beyond this a whole number has no float of its own, and no setting has a meaning.
-_WHOLE_LIMIT = 2.0**53
-
-
-def _setting(default: Any, text: str, least: float = -math.inf, most: float = math.inf) -> Any:
-    metadata = {"description": text, "least": least, "most": most}
-    return field(default=default, metadata=metadata)
-
-
 @dataclass(frozen=True, slots=True)
 class AmclConfig:
     """All settings of the filter; the metadata of each field has its description and range.
@@ -49,76 +39,76 @@ class AmclConfig:
         If a setting has the wrong type or is out of its range, or two contradict each other.
     """
 
-    alpha1: float = _setting(0.2, "rotation noise from rotation", 0.0)
-    alpha2: float = _setting(0.2, "rotation noise from translation", 0.0)
-    alpha3: float = _setting(0.2, "translation noise from translation", 0.0)
-    alpha4: float = _setting(0.2, "translation noise from rotation", 0.0)
-    alpha5: float = _setting(0.2, "sideways noise from translation (omnidirectional)", 0.0)
-    robot_model_type: MotionModel = _setting(MotionModel.DIFFERENTIAL, "how the base moves")
+    alpha1: float = setting(0.2, "rotation noise from rotation", 0.0)
+    alpha2: float = setting(0.2, "rotation noise from translation", 0.0)
+    alpha3: float = setting(0.2, "translation noise from translation", 0.0)
+    alpha4: float = setting(0.2, "translation noise from rotation", 0.0)
+    alpha5: float = setting(0.2, "sideways noise from translation (omnidirectional)", 0.0)
+    robot_model_type: MotionModel = setting(MotionModel.DIFFERENTIAL, "how the base moves")
 
-    laser_model_type: SensorModel = _setting(
+    laser_model_type: SensorModel = setting(
         SensorModel.LIKELIHOOD_FIELD, "how a scan weighs a particle"
     )
-    max_beams: int = _setting(60, "beams of a scan used, evenly spaced", 2, 20_000)
-    laser_min_range: float = _setting(-1.0, "shortest range used, m; -1: the sensor's own", -1.0)
-    laser_max_range: float = _setting(100.0, "longest range used, m; -1: the sensor's own", -1.0)
-    laser_likelihood_max_dist: float = _setting(
+    max_beams: int = setting(60, "beams of a scan used, evenly spaced", 2, 20_000)
+    laser_min_range: float = setting(-1.0, "shortest range used, m; -1: the sensor's own", -1.0)
+    laser_max_range: float = setting(100.0, "longest range used, m; -1: the sensor's own", -1.0)
+    laser_likelihood_max_dist: float = setting(
         2.0, "distance from a wall beyond which an end point is just wrong, m", 0.01
     )
-    z_hit: float = _setting(0.5, "weight of a hit in the mixture", 0.0, 1.0)
-    z_short: float = _setting(0.05, "weight of something before the wall (beam)", 0.0, 1.0)
-    z_max: float = _setting(0.05, "weight of no return (beam)", 0.0, 1.0)
-    z_rand: float = _setting(0.5, "weight of anything at all", 1e-6, 1.0)
-    sigma_hit: float = _setting(0.2, "spread of a hit, m", 1e-3)
-    lambda_short: float = _setting(0.1, "decay of the readings before the wall (beam), 1/m", 1e-6)
-    do_beamskip: bool = _setting(
+    z_hit: float = setting(0.5, "weight of a hit in the mixture", 0.0, 1.0)
+    z_short: float = setting(0.05, "weight of something before the wall (beam)", 0.0, 1.0)
+    z_max: float = setting(0.05, "weight of no return (beam)", 0.0, 1.0)
+    z_rand: float = setting(0.5, "weight of anything at all", 1e-6, 1.0)
+    sigma_hit: float = setting(0.2, "spread of a hit, m", 1e-3)
+    lambda_short: float = setting(0.1, "decay of the readings before the wall (beam), 1/m", 1e-6)
+    do_beamskip: bool = setting(
         False, "leave out beams that most particles do not explain (likelihood_field_prob)"
     )
-    beam_skip_distance: float = _setting(
+    beam_skip_distance: float = setting(
         0.5, "distance from a wall up to which an end point is explained, m", 0.0
     )
-    beam_skip_threshold: float = _setting(
+    beam_skip_threshold: float = setting(
         0.3, "share of particles that must explain a beam for it to count", 0.0, 1.0
     )
-    beam_skip_error_threshold: float = _setting(
+    beam_skip_error_threshold: float = setting(
         0.9, "share of beams skipped from which on none is", 0.0, 1.0
     )
-    model_unknown_space: bool = _setting(
+    model_unknown_space: bool = setting(
         False, "an end point in unknown space is neither in a wall nor in the free"
     )
 
-    min_particles: int = _setting(500, "least number of particles", 1, 10_000_000)
-    max_particles: int = _setting(2000, "greatest number of particles", 1, 10_000_000)
-    pf_err: float = _setting(0.05, "KLD: greatest error of the distribution", 1e-6, 1.0)
-    pf_z: float = _setting(
+    min_particles: int = setting(500, "least number of particles", 1, 10_000_000)
+    max_particles: int = setting(2000, "greatest number of particles", 1, 10_000_000)
+    pf_err: float = setting(0.05, "KLD: greatest error of the distribution", 1e-6, 1.0)
+    pf_z: float = setting(
         0.99, "KLD: upper standard normal quantile of the probability of a smaller error", 0.0, 10.0
     )
-    resample_interval: int = _setting(1, "updates from one resampling to the next", 1)
-    selective_resampling: bool = _setting(
+    resample_interval: int = setting(1, "updates from one resampling to the next", 1)
+    selective_resampling: bool = setting(
         False, "resample only when the effective sample size is below half of the particles"
     )
-    recovery_alpha_slow: float = _setting(
+    recovery_alpha_slow: float = setting(
         0.0, "decay of the slow average weight; 0: no new particles (0.001 is a good start)", 0, 1
     )
-    recovery_alpha_fast: float = _setting(
+    recovery_alpha_fast: float = setting(
         0.0, "decay of the fast average weight; 0: no new particles (0.1 is a good start)", 0, 1
     )
-    update_min_d: float = _setting(0.25, "translation before an update, m", 0.0)
-    update_min_a: float = _setting(0.2, "rotation before an update, rad", 0.0)
-    random_seed: int = _setting(-1, "seed of all randomness; negative: 0, so that runs repeat", -1)
+    update_min_d: float = setting(0.25, "translation before an update, m", 0.0)
+    update_min_a: float = setting(0.2, "rotation before an update, rad", 0.0)
+    random_seed: int = setting(-1, "seed of all randomness; negative: 0, so that runs repeat", -1)
 
-    set_initial_pose: bool = _setting(False, "start at initial_pose")
-    initial_pose: SE2 = _setting(SE2.identity(), "pose of the base in the map at the start")
-    always_reset_initial_pose: bool = _setting(False, "forget the last pose at every reset")
-    save_pose_rate: float = _setting(0.5, "rate at which the pose is saved, Hz; -1: never", -1.0)
-    transform_tolerance: float = _setting(1.0, "validity of map -> odom into the future, s", 0.0)
-    tf_broadcast: bool = _setting(True, "publish map -> odom")
-    first_map_only: bool = _setting(False, "ignore maps after the first")
-    base_frame_id: str = _setting("base_footprint", "frame of the base")
-    odom_frame_id: str = _setting("odom", "frame of the odometry")
-    global_frame_id: str = _setting("map", "frame of the map")
-    scan_topic: str = _setting("scan", "topic of the scans")
-    map_topic: str = _setting("map", "topic of the map")
+    set_initial_pose: bool = setting(False, "start at initial_pose")
+    initial_pose: SE2 = setting(SE2.identity(), "pose of the base in the map at the start")
+    always_reset_initial_pose: bool = setting(False, "forget the last pose at every reset")
+    save_pose_rate: float = setting(0.5, "rate at which the pose is saved, Hz; -1: never", -1.0)
+    transform_tolerance: float = setting(1.0, "validity of map -> odom into the future, s", 0.0)
+    tf_broadcast: bool = setting(True, "publish map -> odom")
+    first_map_only: bool = setting(False, "ignore maps after the first")
+    base_frame_id: str = setting("base_footprint", "frame of the base")
+    odom_frame_id: str = setting("odom", "frame of the odometry")
+    global_frame_id: str = setting("map", "frame of the map")
+    scan_topic: str = setting("scan", "topic of the scans")
+    map_topic: str = setting("map", "topic of the map")
 
     @property
     def seed(self) -> int:
@@ -126,40 +116,10 @@ class AmclConfig:
         return max(0, self.random_seed)
 
     def __post_init__(self) -> None:
-        for entry in fields(self):
-            value = _checked(
-                entry.name, getattr(self, entry.name), entry.default, dict(entry.metadata)
-            )
-            object.__setattr__(self, entry.name, value)
+        check_settings(self)
         if self.min_particles > self.max_particles:
             raise InputError(
                 expected="min_particles up to max_particles",
                 received=f"{self.min_particles} and {self.max_particles}",
                 remedy="raise max_particles or lower min_particles",
             )
-
-
-def _checked(name: str, value: object, default: object, metadata: dict[str, Any]) -> object:
-    """Return a setting in the type of its default; raise InputError if it does not fit."""
-    least, most = metadata["least"], metadata["most"]
-    if isinstance(default, float) and type(value) is int and abs(value) < _WHOLE_LIMIT:
-        value = float(value)
-    fits = type(value) is type(default) and value != ""
-    if fits and isinstance(value, (int, float)):
-        fits = bool(least <= value <= min(most, _WHOLE_LIMIT))  # not for NaN, not for infinity
-    if fits:
-        return value
-    limits = "" if least == -math.inf else f" of at least {least:g}"
-    limits += "" if most == math.inf else f" and at most {most:g}"
-    raise InputError(
-        expected=f"{name} ({metadata['description']}) as {_kind(default)}{limits}",
-        received=f"{value!r:.60}",
-        remedy=f"the default is {default.value if isinstance(default, Enum) else default}",
-    )
-
-
-def _kind(default: object) -> str:
-    if isinstance(default, Enum):
-        return "one of " + ", ".join(str(choice.value) for choice in type(default))
-    names = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
-    return names.get(type(default), "a pose")

@@ -19,6 +19,7 @@ from firstfix.cli.demo import demo
 from firstfix.cli.doctor import doctor
 from firstfix.cli.locate import locate
 from firstfix.cli.map import map_app
+from firstfix.cli.nodes import PASSED_ON, ros1
 from firstfix.cli.track import track
 from firstfix.core.errors import FirstfixError
 
@@ -38,6 +39,7 @@ app.command()(track)
 app.command()(bench)
 app.add_typer(map_app, name="map")
 app.command()(demo)
+app.command(context_settings=PASSED_ON)(ros1)
 app.command()(doctor)
 
 

@@ -11,12 +11,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from firstfix.core.errors import ScanError
+from firstfix.core.errors import MapError, ScanError
+from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan, Mounting
 from firstfix.core.se2 import SE2
 
 # A unit quaternion that lost more than this is not a rotation any more.
 MIN_NORM = 1e-3
+
+INT8_MAX = 127
 
 
 class StampedTransform(NamedTuple):
@@ -111,6 +114,49 @@ def to_laser_scan(
     )
 
 
+def to_grid(message: Any) -> OccupancyGrid:
+    """Convert a ``nav_msgs/OccupancyGrid``.
+
+    Parameters
+    ----------
+    message : message
+        The map; a yaw of its origin counts, a tilt does not.
+
+    Returns
+    -------
+    OccupancyGrid
+        The map, with a copy of the cells.
+
+    Raises
+    ------
+    MapError
+        If the message cannot describe a map.
+    """
+    info = message.info
+    # rclpy has an array.array here, rospy a tuple, rosbags an ndarray.
+    data = np.array(message.data)
+    if data.size != info.height * info.width or (data.size and abs(data).max() > INT8_MAX):
+        raise MapError(
+            expected=f"{info.width} x {info.height} cells from -1 to 100",
+            received=f"{data.size} numbers",
+            remedy="look for the node that publishes the map",
+        )
+    origin = _normalized(info.origin.orientation)
+    x, y, yaw = _shadow((info.origin.position.x, info.origin.position.y), origin)
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):
+        raise MapError(
+            expected="an origin of finite numbers",
+            received=f"({x}, {y}) and a yaw of {yaw}",
+            remedy="look for the node that publishes the map",
+        )
+    return OccupancyGrid(
+        data.astype(np.int8).reshape(info.height, info.width),
+        # 0.05 travels as 0.05000000074505806: what was meant is the shortest that reads the same.
+        float(str(np.float32(info.resolution))),
+        SE2(x, y, yaw),
+    )
+
+
 def to_transform(message: Any) -> StampedTransform:
     """Convert a ``geometry_msgs/TransformStamped``.
 
@@ -124,7 +170,8 @@ def to_transform(message: Any) -> StampedTransform:
     StampedTransform
         ``T_parent_child``, of ``frame_id`` and ``child_frame_id``.
     """
-    return _stamped(message, message.transform.translation, message.transform.rotation)
+    placed = message.transform
+    return _stamped(message.header, message.child_frame_id, placed.translation, placed.rotation)
 
 
 def to_odometry(message: Any) -> StampedTransform:
@@ -141,7 +188,45 @@ def to_odometry(message: Any) -> StampedTransform:
         ``T_odom_base``, of ``frame_id`` and ``child_frame_id``.
     """
     pose = message.pose.pose
-    return _stamped(message, pose.position, pose.orientation)
+    return _stamped(message.header, message.child_frame_id, pose.position, pose.orientation)
+
+
+def to_pose(message: Any) -> StampedTransform:
+    """Convert a ``geometry_msgs/PoseWithCovarianceStamped``.
+
+    Parameters
+    ----------
+    message : message
+        A pose; its covariance is not used.
+
+    Returns
+    -------
+    StampedTransform
+        From ``frame_id`` to a child without a name.
+    """
+    pose = message.pose.pose
+    return _stamped(message.header, "", pose.position, pose.orientation)
+
+
+def to_pressed(message: Any) -> tuple[int, bool]:
+    """Convert a CliffEvent, WheelDropEvent or BumperEvent of a Kobuki, or a ``std_msgs/Bool``.
+
+    Parameters
+    ----------
+    message : message
+        The event.
+
+    Returns
+    -------
+    tuple of int and bool
+        Which of the sensors of this kind (left, centre, right; 0 for a Bool), and whether it has
+        begun to report: a cliff, a dropped wheel, a pressed bumper.
+    """
+    if hasattr(message, "data"):
+        return 0, bool(message.data)
+    names = ("sensor", "wheel", "bumper")
+    which = next(getattr(message, name) for name in names if hasattr(message, name))
+    return int(which), bool(message.state)
 
 
 def to_planar(transform: StampedTransform) -> SE2:
@@ -174,21 +259,31 @@ def to_planar(transform: StampedTransform) -> SE2:
 
 def planar(transform: StampedTransform) -> tuple[float, float, float]:
     """Return what `to_planar` does as x (m), y (m), yaw (rad), NaN where it is not known."""
-    x, y, z, w = transform.rotation
+    return _shadow(transform.translation[:2], transform.rotation)
+
+
+def _shadow(
+    translation: tuple[float, float], rotation: tuple[float, float, float, float]
+) -> tuple[float, float, float]:
+    x, y, z, w = rotation
     # atan2(R[1, 0], R[0, 0]): where the x axis points, also upside down.
     yaw = math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
-    return transform.translation[0], transform.translation[1], yaw
+    return float(translation[0]), float(translation[1]), yaw
 
 
-def _stamped(message: Any, translation: Any, rotation: Any) -> StampedTransform:
+def _normalized(rotation: Any) -> tuple[float, float, float, float]:
     q = (float(rotation.x), float(rotation.y), float(rotation.z), float(rotation.w))
     norm = math.hypot(*q)
     # An unset quaternion is all zeros, which some nodes send for "not known"; others send NaN.
     x, y, z, w = (v / norm for v in q) if norm > MIN_NORM else (math.nan,) * 4
+    return x, y, z, w
+
+
+def _stamped(header: Any, child: str, translation: Any, rotation: Any) -> StampedTransform:
     return StampedTransform(
-        parent=to_frame(message.header.frame_id),
-        child=to_frame(message.child_frame_id),
-        stamp=to_seconds(message.header.stamp),
+        parent=to_frame(header.frame_id),
+        child=to_frame(child),
+        stamp=to_seconds(header.stamp),
         translation=(float(translation.x), float(translation.y), float(translation.z)),
-        rotation=(x, y, z, w),
+        rotation=_normalized(rotation),
     )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from firstfix.core.errors import ScanError
 from firstfix.core.scan import Mounting
 from firstfix.core.se2 import SE2
-from firstfix.formats.tf_tree import flat
+from firstfix.formats.transforms import flat
 
 # At 5° a range of 10 m is off by 4 cm, about a cell, and the beam has climbed 0.9 m.
 NOTED_TILT = math.radians(5.0)

@@ -14,6 +14,7 @@ from firstfix.core.se2 import SE2
 from firstfix.core.trajectory import Trajectory
 from firstfix.formats.messages import StampedTransform, planar
 from firstfix.formats.poses import chain
+from firstfix.formats.transforms import flat, inverse, matrix
 
 BASE_NAMES = ("base_link", "base_footprint")
 
@@ -128,9 +129,9 @@ class TransformTree:
     def _neighbours(self, frame: str) -> Iterator[tuple[str, NDArray[np.float64]]]:
         for (parent, child), edge in self._edges.items():
             if edge.fixed and parent == frame:
-                yield child, _matrix(edge.first)
+                yield child, matrix(edge.first)
             elif edge.fixed and child == frame:
-                yield parent, _inverse(_matrix(edge.first))
+                yield parent, inverse(matrix(edge.first))
 
 
 def is_odometry_frame(name: str) -> bool:
@@ -138,35 +139,11 @@ def is_odometry_frame(name: str) -> bool:
     return "odom" in name.rpartition("/")[2]
 
 
-def flat(T: NDArray[np.float64]) -> SE2:
-    """Project a transform in space, shape (4, 4), onto the floor; SE2 of its x axis."""
-    return SE2(float(T[0, 3]), float(T[1, 3]), math.atan2(T[1, 0], T[0, 0]))
-
-
 def _trajectory(path: array[float], T_child_base: SE2) -> Trajectory | None:
     rows = np.array(path, np.float64).reshape(-1, 4)
     rows = rows[np.isfinite(rows).all(axis=1)]
     stamps, first = np.unique(rows[:, 0], return_index=True)
     return Trajectory(stamps, chain(rows[first, 1:], T_child_base)) if len(stamps) else None
-
-
-def _matrix(transform: StampedTransform) -> NDArray[np.float64]:
-    x, y, z, w = transform.rotation
-    T = np.eye(4)
-    T[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    T[:3, 3] = transform.translation
-    return T
-
-
-def _inverse(T: NDArray[np.float64]) -> NDArray[np.float64]:
-    inverse = np.eye(4)
-    inverse[:3, :3] = T[:3, :3].T
-    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
-    return inverse
 
 
 def _is_known(transform: StampedTransform) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from pathlib import Path
 
@@ -70,6 +71,7 @@ class Localizer:
         self._odometry = OdometryBuffer()
         self._waiting: deque[LaserScan] = deque(maxlen=_MOST_WAITING)
         self._lifted: set[SignalKind] = set()
+        self._stands_since = -math.inf
         self._found_nothing_at: tuple[float, SE2] | None = None
         self._update_asked = False
         self._looked_at = 0.0
@@ -139,6 +141,7 @@ class Localizer:
         if not self._odometry.add(given):
             return self._take_waiting_scan()
         self._waiting.clear()  # of the clock or the frame before
+        self._stands_since = min(self._stands_since, given.stamp)
         return self._follow_jump(before, given)
 
     def _take_signal(self, given: Signal) -> list[Output]:
@@ -146,6 +149,7 @@ class Localizer:
             return []
         if not given.active:
             self._lifted.discard(given.kind)
+            self._stands_since = given.stamp
             self._waiting.clear()  # taken in somebody's hands
             return []
         self._lifted.add(given.kind)
@@ -177,7 +181,7 @@ class Localizer:
         if T_odom_base is None:
             reason = "a scan is older than the odometry that is known: left out"
             return [Status(scan.stamp, self.state, reason)]
-        if self._lifted:
+        if self._lifted or scan.stamp < self._stands_since:
             return []
         if self.state is State.SEARCHING:
             return self._search(scan, T_odom_base)

@@ -1,0 +1,121 @@
+"""A node without its transport: hear, think in a thread of its own, say."""
+
+from __future__ import annotations
+
+import threading
+import time
+import traceback
+from pathlib import Path
+from typing import Any
+
+from firstfix.adapters.announcer import Announcer
+from firstfix.adapters.inbox import Inbox
+from firstfix.adapters.intake import Intake
+from firstfix.adapters.topics import Heard, heard_topics
+from firstfix.adapters.transport import Gravity, Transport
+from firstfix.adapters.warm_up import warm_up
+from firstfix.core.errors import InputError
+from firstfix.fields.cache import cache_folder
+from firstfix.formats.map_server import load_map
+from firstfix.system.config import LocalizerConfig
+from firstfix.system.inputs import Input, NewMap
+from firstfix.system.localizer import Localizer
+from firstfix.system.node_config import NodeConfig
+
+# One sentence on one subject is said that often at most.
+_REPEAT_S = 10.0
+# Without a message for so long, the worker looks what is missing.
+_IDLE_S = 5.0
+
+
+class Node:
+    """The localizer of a robot, fed by callbacks of any thread.
+
+    Parameters
+    ----------
+    config : NodeConfig
+        Settings.
+    transport : Transport
+        What messages are made with and sent to; called from the worker only.
+    """
+
+    def __init__(self, config: NodeConfig, transport: Transport) -> None:
+        self._config = config
+        self._transport = transport
+        self._inbox: Inbox[tuple[Heard, Any]] = Inbox()
+        self._intake = Intake(config.amcl, self._complain)
+        self._announcer = Announcer(config, transport)
+        self._localizer = Localizer(LocalizerConfig(amcl=config.amcl), cache_folder())
+        self._said_at: dict[str, float] = {}
+        self._heard: set[Heard] = set()
+        self._worker = threading.Thread(target=self._work, name="firstfix", daemon=True)
+
+    def start(self) -> None:
+        """Begin to think; kernels and map are made ready first."""
+        self._worker.start()
+
+    def stop(self) -> None:
+        """End, after what is being thought now."""
+        self._inbox.close()
+        self._worker.join()
+
+    def hear(self, heard: Heard, message: Any = None) -> None:
+        """Take in a message or a request; returns at once.
+
+        Parameters
+        ----------
+        heard : Heard
+            What it is.
+        message : message
+            None for a request.
+        """
+        put = self._inbox.put_scan if heard is Heard.SCAN else self._inbox.put
+        put((heard, message))
+
+    def _work(self) -> None:
+        self._try(self._make_ready)
+        while not self._inbox.is_closed:
+            items = self._inbox.take(_IDLE_S)
+            for heard, message in items:
+                self._heard.add(heard)
+                self._try(self._take, heard, message)
+            if not items:
+                self._say_what_is_missing()
+
+    def _make_ready(self) -> None:
+        warm_up(self._config.amcl)
+        if self._config.yaml_filename:
+            grid = load_map(Path(self._config.yaml_filename))
+            self._give(self._intake.use_map(NewMap(0.0, grid)))
+
+    def _take(self, heard: Heard, message: Any) -> None:
+        if heard is Heard.INITIAL_POSE and self._announcer.is_own(message):
+            return
+        self._give(self._intake.take(heard, message))
+
+    def _give(self, inputs: list[Input]) -> None:
+        for given in inputs:
+            outputs = self._localizer.handle(given)
+            self._announcer.announce(outputs, self._localizer.particles)
+
+    def _try(self, step: Any, *given: Any) -> None:
+        """Do something that must not end the node, whatever came over the wire."""
+        try:
+            step(*given)
+        except InputError as error:
+            self._complain(str(error)[:40], f"{error}")
+        except Exception:  # noqa: BLE001 - a node that died silently would be worse
+            self._complain("error", f"an error of firstfix itself:\n{traceback.format_exc()}")
+
+    def _complain(self, subject: str, text: str) -> None:
+        now = time.monotonic()
+        if now - self._said_at.get(subject, -_REPEAT_S) >= _REPEAT_S:
+            self._said_at[subject] = now
+            self._transport.log(Gravity.WARNING, text)
+
+    def _say_what_is_missing(self) -> None:
+        topics = heard_topics(self._config)
+        for heard in (Heard.MAP, Heard.TF, Heard.SCAN):
+            if heard in topics and heard not in self._heard:
+                text = f"nothing heard on {topics[heard].name} ({topics[heard].type_name}) so far"
+                self._complain(heard.value, text)

@@ -1,0 +1,102 @@
+"""Message classes of ROS 1: those that are installed, and those that are not."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import genpy
+import genpy.dynamic
+import roslib.message
+import rospy
+from rosbags.typesys import Stores, get_typestore
+
+_EMPTY = "std_srvs/Empty"
+# Of an empty text.
+_EMPTY_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
+
+
+@functools.cache
+def message_class(type_name: str) -> Any:
+    """Return the class of a message, made from its definition where its package is not installed.
+
+    rospy needs few packages, and diagnostic_msgs is not among them.
+
+    Parameters
+    ----------
+    type_name : str
+        ``package/Type``, one that ROS 1 Noetic has.
+
+    Returns
+    -------
+    type
+        The class.
+    """
+    found = roslib.message.get_message_class(type_name)
+    if found is not None:
+        return found
+    package, _, name = type_name.partition("/")
+    store = get_typestore(Stores.ROS1_NOETIC)
+    definition, _ = store.generate_msgdef(f"{package}/msg/{name}", ros_version=1)
+    return genpy.dynamic.generate_dynamic(type_name, definition)[type_name]
+
+
+def make(type_name: str, /, **fields: Any) -> Any:
+    """Build a message of ROS 1 from its fields."""
+    if type_name == "builtin_interfaces/Time":
+        return rospy.Time(fields["sec"], fields["nanosec"])
+    return message_class(type_name)(**fields)
+
+
+def decoded(message: rospy.AnyMsg) -> Any:
+    """Decode a message by the definition that its publisher sent along.
+
+    So the packages of a Kobuki are not needed to hear it.
+
+    Parameters
+    ----------
+    message : rospy.AnyMsg
+        As received.
+
+    Returns
+    -------
+    message
+        With fields.
+    """
+    head = message._connection_header  # noqa: SLF001 - rospy has no other way to the definition
+    kind = _defined(head["type"], head["message_definition"])
+    return kind().deserialize(message._buff)  # noqa: SLF001 - nor to the bytes
+
+
+@functools.cache
+def _defined(type_name: str, definition: str) -> Any:
+    return genpy.dynamic.generate_dynamic(type_name, definition)[type_name]
+
+
+class _Nothing(genpy.Message):  # type: ignore[misc]
+    """An empty request, and an empty response."""
+
+    _md5sum = _EMPTY_MD5
+    _type = _EMPTY
+    _full_text = ""
+    __slots__ = ()
+    _slot_types: tuple[str, ...] = ()
+
+    def _get_types(self) -> tuple[str, ...]:
+        return self._slot_types
+
+    def serialize(self, buff: Any) -> None:
+        """Write nothing."""
+
+    def deserialize(self, _: bytes) -> _Nothing:
+        """Read nothing."""
+        return self
+
+
+class Empty:
+    """``std_srvs/Empty``, a service that says nothing and answers nothing."""
+
+    _type = _EMPTY
+    _md5sum = _EMPTY_MD5
+    _request_class = _Nothing
+    _response_class = _Nothing

@@ -1,0 +1,80 @@
+"""Settings: dataclass fields that know what they mean and how far they may go."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import field, fields
+from enum import Enum
+from typing import Any
+
+from firstfix.core.errors import InputError
+
+# Beyond this a whole number has no float of its own, and no setting has a meaning.
+_WHOLE_LIMIT = 2.0**53
+
+
+def setting(default: Any, text: str, least: float = -math.inf, most: float = math.inf) -> Any:
+    """Declare a field of a frozen dataclass.
+
+    Parameters
+    ----------
+    default : bool, int, float, str, Enum or another frozen value
+        The default; its type is that of the setting.
+    text : str
+        What it means, with its unit.
+    least, most : float
+        The range of a number, both ends included.
+
+    Returns
+    -------
+    Field
+        With description, least and most in its metadata.
+    """
+    metadata = {"description": text, "least": least, "most": most}
+    return field(default=default, metadata=metadata)
+
+
+def check_settings(config: Any) -> None:
+    """Check all fields of a dataclass that has just been made; whole numbers become floats.
+
+    Parameters
+    ----------
+    config : dataclass
+        One whose fields were declared by `setting`.
+
+    Raises
+    ------
+    InputError
+        If a setting has the wrong type or is out of its range.
+    """
+    for entry in fields(config):
+        if "description" in entry.metadata:
+            given = getattr(config, entry.name)
+            value = _checked(entry.name, given, entry.default, dict(entry.metadata))
+            object.__setattr__(config, entry.name, value)
+
+
+def _checked(name: str, value: object, default: object, metadata: dict[str, Any]) -> object:
+    """Return a setting in the type of its default; raise InputError if it does not fit."""
+    least, most = metadata["least"], metadata["most"]
+    if isinstance(default, float) and type(value) is int and abs(value) < _WHOLE_LIMIT:
+        value = float(value)
+    fits = type(value) is type(default) and (value != "" or default == "")
+    if fits and isinstance(value, (int, float)):
+        fits = bool(least <= value <= min(most, _WHOLE_LIMIT))  # not for NaN, not for infinity
+    if fits:
+        return value
+    limits = "" if least == -math.inf else f" of at least {least:g}"
+    limits += "" if most == math.inf else f" and at most {most:g}"
+    raise InputError(
+        expected=f"{name} ({metadata['description']}) as {_kind(default)}{limits}",
+        received=f"{value!r:.60}",
+        remedy=f"the default is {default.value if isinstance(default, Enum) else default}",
+    )
+
+
+def _kind(default: object) -> str:
+    if isinstance(default, Enum):
+        return "one of " + ", ".join(str(choice.value) for choice in type(default))
+    names = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
+    return names.get(type(default), "a pose")

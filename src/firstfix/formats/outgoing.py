@@ -1,0 +1,276 @@
+"""Core types to ROS messages, whoever will send them.
+
+Nothing here imports ROS. A transport gives a function ``make("package/Type", **fields)``, because
+classes of rospy, rclpy and rosbags are all built from the fields of their definition by name.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+
+# Of x, y and yaw in the 6 x 6 covariance of a message: x, y, z, roll, pitch, yaw.
+_PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
+_NS = 1_000_000_000
+
+
+Make = Callable[..., Any]
+
+
+class Level(IntEnum):
+    """Levels of ``diagnostic_msgs/DiagnosticStatus``."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+
+
+def header(make: Make, stamp: float, frame: str) -> Any:
+    """Build a ``std_msgs/Header``.
+
+    Parameters
+    ----------
+    make : Make
+        Of the transport.
+    stamp : float
+        Time, s; one before the epoch becomes 0, which the messages cannot go below.
+    frame : str
+        ``frame_id``.
+
+    Returns
+    -------
+    message
+        The header.
+    """
+    ns = max(0, round(stamp * _NS))
+    time = make("builtin_interfaces/Time", sec=ns // _NS, nanosec=ns % _NS)
+    return make("std_msgs/Header", stamp=time, frame_id=frame)
+
+
+def pose(make: Make, T: SE2) -> Any:
+    """Build a ``geometry_msgs/Pose`` on the floor."""
+    return make(
+        "geometry_msgs/Pose",
+        position=make("geometry_msgs/Point", x=T.x, y=T.y, z=0.0),
+        orientation=_turned(make, T.yaw),
+    )
+
+
+def pose_with_covariance(
+    make: Make, stamp: float, frame: str, T_map_base: SE2, covariance: NDArray[np.float64]
+) -> Any:
+    """Build a ``geometry_msgs/PoseWithCovarianceStamped``.
+
+    Parameters
+    ----------
+    make : Make
+        Of the transport.
+    stamp : float
+        Time, s.
+    frame : str
+        Frame of the map.
+    T_map_base : SE2
+        The pose.
+    covariance : ndarray, shape (3, 3)
+        Of x (m), y (m), yaw (rad) in the map frame.
+
+    Returns
+    -------
+    message
+        With zeros for z, roll and pitch.
+    """
+    full = np.zeros((6, 6))
+    full[_PLANAR] = covariance
+    placed = make(
+        "geometry_msgs/PoseWithCovariance", pose=pose(make, T_map_base), covariance=full.ravel()
+    )
+    return make(
+        "geometry_msgs/PoseWithCovarianceStamped", header=header(make, stamp, frame), pose=placed
+    )
+
+
+def pose_array(make: Make, stamp: float, frame: str, poses: Iterable[SE2]) -> Any:
+    """Build a ``geometry_msgs/PoseArray`` of poses in a frame."""
+    listed = [pose(make, T) for T in poses]
+    return make("geometry_msgs/PoseArray", header=header(make, stamp, frame), poses=listed)
+
+
+def particle_cloud(
+    make: Make, stamp: float, frame: str, poses: NDArray[np.float64], weights: NDArray[np.float64]
+) -> Any:
+    """Build a ``nav2_msgs/ParticleCloud``.
+
+    Parameters
+    ----------
+    make : Make
+        Of the transport.
+    stamp : float
+        Time, s.
+    frame : str
+        Frame of the map.
+    poses : ndarray, shape (n, 3)
+        x (m), y (m), yaw (rad).
+    weights : ndarray, shape (n,)
+        Of each.
+
+    Returns
+    -------
+    message
+        The particles in this order.
+    """
+    particles = [
+        make("nav2_msgs/Particle", pose=pose(make, SE2(x, y, yaw)), weight=weight)
+        for (x, y, yaw), weight in zip(poses.tolist(), weights.tolist(), strict=True)
+    ]
+    return make("nav2_msgs/ParticleCloud", header=header(make, stamp, frame), particles=particles)
+
+
+def transforms(make: Make, stamp: float, parent: str, child: str, T_parent_child: SE2) -> Any:
+    """Build a ``tf2_msgs/TFMessage`` of one transform."""
+    T = T_parent_child
+    stamped = make(
+        "geometry_msgs/TransformStamped",
+        header=header(make, stamp, parent),
+        child_frame_id=child,
+        transform=make(
+            "geometry_msgs/Transform",
+            translation=make("geometry_msgs/Vector3", x=T.x, y=T.y, z=0.0),
+            rotation=_turned(make, T.yaw),
+        ),
+    )
+    return make("tf2_msgs/TFMessage", transforms=[stamped])
+
+
+def diagnostics(
+    make: Make, stamp: float, name: str, level: Level, message: str, values: Mapping[str, str]
+) -> Any:
+    """Build a ``diagnostic_msgs/DiagnosticArray`` of one status.
+
+    Parameters
+    ----------
+    make : Make
+        Of the transport.
+    stamp : float
+        Time, s.
+    name : str
+        What the status is of.
+    level : Level
+        How grave it is.
+    message : str
+        For a person.
+    values : mapping of str to str
+        For a program.
+
+    Returns
+    -------
+    message
+        The array.
+    """
+    status = make(
+        "diagnostic_msgs/DiagnosticStatus",
+        level=level,
+        name=name,
+        message=message,
+        hardware_id="",
+        values=[make("diagnostic_msgs/KeyValue", key=k, value=v) for k, v in values.items()],
+    )
+    return make("diagnostic_msgs/DiagnosticArray", header=header(make, stamp, ""), status=[status])
+
+
+def laser_scan(make: Make, frame: str, scan: LaserScan) -> Any:
+    """Build a ``sensor_msgs/LaserScan``; where the sensor sits is for ``tf`` to tell.
+
+    Parameters
+    ----------
+    make : Make
+        Of the transport.
+    frame : str
+        Frame of the sensor.
+    scan : LaserScan
+        The scan.
+
+    Returns
+    -------
+    message
+        Without intensities and times of its own beams.
+    """
+    n = len(scan.ranges)
+    return make(
+        "sensor_msgs/LaserScan",
+        header=header(make, scan.stamp, frame),
+        angle_min=scan.angle_min,
+        angle_max=scan.angle_min + (n - 1) * scan.angle_increment,
+        angle_increment=scan.angle_increment,
+        time_increment=0.0,
+        scan_time=0.0,
+        range_min=scan.range_min,
+        range_max=scan.range_max,
+        ranges=np.asarray(scan.ranges, np.float32),
+        intensities=np.empty(0, np.float32),
+    )
+
+
+def occupancy_grid(make: Make, stamp: float, frame: str, grid: OccupancyGrid) -> Any:
+    """Build a ``nav_msgs/OccupancyGrid``; what nobody has seen is unknown there.
+
+    Parameters
+    ----------
+    make : Make
+        Of the transport.
+    stamp : float
+        Time, s.
+    frame : str
+        Frame of the map.
+    grid : OccupancyGrid
+        The map.
+
+    Returns
+    -------
+    message
+        The map, row 0 at the bottom.
+    """
+    top = header(make, stamp, frame)
+    info = make(
+        "nav_msgs/MapMetaData",
+        map_load_time=top.stamp,
+        resolution=grid.resolution,
+        width=grid.width,
+        height=grid.height,
+        origin=pose(make, grid.T_map_grid),
+    )
+    cells = np.where(grid.unknown, np.int8(-1), grid.cells)
+    return make("nav_msgs/OccupancyGrid", header=top, info=info, data=cells.ravel())
+
+
+def odometry(make: Make, stamp: float, odom: str, base: str, T_odom_base: SE2) -> Any:
+    """Build a ``nav_msgs/Odometry`` without speeds and covariances."""
+    still = make("geometry_msgs/Vector3", x=0.0, y=0.0, z=0.0)
+    return make(
+        "nav_msgs/Odometry",
+        header=header(make, stamp, odom),
+        child_frame_id=base,
+        pose=make(
+            "geometry_msgs/PoseWithCovariance",
+            pose=pose(make, T_odom_base),
+            covariance=np.zeros(36),
+        ),
+        twist=make(
+            "geometry_msgs/TwistWithCovariance",
+            twist=make("geometry_msgs/Twist", linear=still, angular=still),
+            covariance=np.zeros(36),
+        ),
+    )
+
+
+def _turned(make: Make, yaw: float) -> Any:
+    half = 0.5 * yaw
+    return make("geometry_msgs/Quaternion", x=0.0, y=0.0, z=math.sin(half), w=math.cos(half))

@@ -1,0 +1,41 @@
+"""What the simulated robots of the tests do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from firstfix.core.grid import OccupancyGrid
+from firstfix.sim.phases import CarryTo, DriveTo, Stand
+from firstfix.sim.scenario import Scenario
+from firstfix.sim.world import WORLDS, identical_rooms
+
+Script = Callable[[], tuple[OccupancyGrid, Scenario, int]]
+
+
+def stand() -> tuple[OccupancyGrid, Scenario, int]:
+    """Stand still in an office."""
+    return WORLDS["office"](), Scenario((Stand(60.0),)), 1
+
+
+def drive() -> tuple[OccupancyGrid, Scenario, int]:
+    """Drive for a minute or more."""
+    return WORLDS["office"](), Scenario((Stand(1.0), *[DriveTo()] * 6)), 2
+
+
+def kidnapped() -> tuple[OccupancyGrid, Scenario, int]:
+    """Be carried away, with all that a Kobuki notices of that."""
+    phases = (Stand(4.0), CarryTo(seconds=3.0), Stand(30.0))
+    return WORLDS["office"](), Scenario(phases), 3
+
+
+def twins() -> tuple[OccupancyGrid, Scenario, int]:
+    """Stand in one of four equal rooms."""
+    return identical_rooms(4), Scenario((Stand(60.0),)), 4
+
+
+SCRIPTS: dict[str, Script] = {
+    "stand": stand,
+    "drive": drive,
+    "kidnapped": kidnapped,
+    "twins": twins,
+}
