@@ -1,14 +1,21 @@
-"""Drawn worlds that several tests look at."""
+"""Drawn worlds that several tests look at, and how they judge what was found there."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
+from firstfix.core.angles import angle_error
+from firstfix.core.estimate import LocateResult
 from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields, build_fields
+from firstfix.global_localization.locate import Locator
+from firstfix.sim.world import office
 
 
 @pytest.fixture(scope="session")
@@ -41,3 +48,53 @@ def draw_room() -> Callable[[float], OccupancyGrid]:
 @pytest.fixture(scope="session")
 def room(draw_room: Callable[[float], OccupancyGrid]) -> MapFields:
     return build_fields(draw_room(0.05), None)
+
+
+@pytest.fixture(scope="session")
+def office_locator() -> Locator:
+    return Locator(office())
+
+
+@pytest.fixture(scope="session")
+def found() -> Callable[[LocateResult, SE2, float, float], bool]:
+    """Give a function that tells whether the best hypothesis is near the truth: m, degrees."""
+
+    def found(result: LocateResult, truth: SE2, most_m: float, most_deg: float) -> bool:
+        best = result.best
+        assert best is not None
+        off_deg = math.degrees(angle_error(best.pose.yaw, truth.yaw))
+        return best.pose.distance_to(truth) < most_m and off_deg < most_deg
+
+    return found
+
+
+@pytest.fixture(scope="session")
+def told() -> Callable[[LocateResult], tuple[object, ...]]:
+    """Give a function that returns all of an answer but the time it took, to the last bit."""
+
+    def told(result: LocateResult) -> tuple[object, ...]:
+        return (
+            result.verdict,
+            result.reason,
+            result.search,
+            [
+                (h.pose, h.covariance.tolist(), h.score, h.probability, h.evidence)
+                for h in result.hypotheses
+            ],
+        )
+
+    return told
+
+
+@pytest.fixture(scope="session")
+def with_pose() -> Callable[..., LaserScan]:
+    """Give a function that makes the scan of a sensor which sits elsewhere, or sees otherwise."""
+
+    def with_pose(scan: LaserScan, **changes: object) -> LaserScan:
+        settings = {
+            name: getattr(scan, name)
+            for name in ("ranges", "angle_min", "angle_increment", "range_min", "range_max")
+        }
+        return LaserScan(**{**settings, **changes})
+
+    return with_pose
