@@ -6,10 +6,13 @@ import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from firstfix.core.angles import angle_error
+from firstfix.core.estimate import LocateResult
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Odometry
 from firstfix.core.scan import LaserScan
@@ -18,10 +21,11 @@ from firstfix.global_localization.locate import Locator
 from firstfix.sim.drawing import Drawing
 from firstfix.sim.lidar import Lidar
 from firstfix.sim.office import office as draw_office
-from firstfix.sim.world import identical_rooms
+from firstfix.sim.world import identical_rooms, random_free_poses
 from firstfix.system.inputs import Input, NewMap
 from firstfix.system.localizer import Localizer
-from firstfix.system.outputs import Output
+from firstfix.system.outputs import InitialPose, Output, Status, TrackedPose
+from firstfix.system.transitions import State
 
 Damage = Callable[[LaserScan], LaserScan]
 HALF_LIDAR = Lidar(beams=120, fov=math.pi)
@@ -156,3 +160,81 @@ def two_rooms_locator(two_rooms: OccupancyGrid) -> Locator:
 def half_lidar() -> Lidar:
     """See the half in front only."""
     return HALF_LIDAR
+
+
+@pytest.fixture(scope="session")
+def of() -> Callable[[Any, list[Output]], list[Any]]:
+    """Give a function that picks the outputs of some kinds."""
+
+    def of(kind: Any, outputs: list[Output]) -> list[Any]:
+        return [output for output in outputs if isinstance(output, kind)]
+
+    return of
+
+
+@pytest.fixture(scope="session")
+def poses(of: Callable[[Any, list[Output]], list[Any]]) -> Callable[[list[Output]], list[Any]]:
+    """Give a function that picks all poses that were published."""
+    return lambda outputs: of((InitialPose, TrackedPose), outputs)
+
+
+@pytest.fixture(scope="session")
+def kinds() -> Callable[[list[Output]], list[type]]:
+    """Give a function that tells of which kinds outputs are."""
+    return lambda outputs: [type(output) for output in outputs]
+
+
+@pytest.fixture(scope="session")
+def is_at() -> Callable[..., bool]:
+    """Give a function that tells whether a pose is as near to the truth as it should be."""
+
+    def is_at(pose: SE2, truth: SE2, metres: float = 0.1, degrees: float = 2.0) -> bool:
+        near = pose.distance_to(truth) <= metres
+        return near and angle_error(pose.yaw, truth.yaw) <= math.radians(degrees)
+
+    return is_at
+
+
+@pytest.fixture(scope="session")
+def office_poses() -> Callable[[OccupancyGrid, int, int], list[SE2]]:
+    """Give a function that draws places in an office where a robot can stand."""
+    return lambda office, n, seed: random_free_poses(office, np.random.default_rng(seed), n, 0.4)
+
+
+@pytest.fixture
+def in_hall(robot_in: Callable[..., Robot], hall_plan: OccupancyGrid) -> Robot:
+    """A robot that has just been found in the hall."""
+    robot = robot_in(hall_plan, SE2(4.0, 3.0, 1.0))
+    assert [type(output) for output in robot.tick()] == [InitialPose, TrackedPose, Status]
+    assert robot.localizer.state is State.LOCALIZED
+    return robot
+
+
+@pytest.fixture
+def foreign(
+    robot_in: Callable[..., Robot],
+    hall_plan: OccupancyGrid,
+    office: OccupancyGrid,
+    office_poses: Callable[[OccupancyGrid, int, int], list[SE2]],
+) -> Robot:
+    """A robot that has just found nothing, in the office with the map of the hall."""
+    for pose in office_poses(office, 4, 3):
+        robot = robot_in(hall_plan, pose)
+        robot.world = office
+        robot.tick()
+        if robot.localizer.state is State.SEARCHING:
+            return robot
+    raise AssertionError("no pose of the office is foreign to the hall")
+
+
+@pytest.fixture
+def searches(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Note the stamps of all scans that a whole map is searched for."""
+    stamps, locate = [], Locator.locate
+
+    def spy(self: Locator, scan: LaserScan) -> LocateResult:
+        stamps.append(scan.stamp)
+        return locate(self, scan)
+
+    monkeypatch.setattr(Locator, "locate", spy)
+    return stamps
