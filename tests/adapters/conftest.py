@@ -1,4 +1,4 @@
-"""Real parts for the adapters: a ROS 1 master, DDS; skipped with a reason where they are missing."""
+"""Real parts for the adapters, a ROS 1 master and DDS; skipped with a reason where missing."""
 
 from __future__ import annotations
 
