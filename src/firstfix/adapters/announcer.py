@@ -106,7 +106,11 @@ class Announcer:
         if self._places:
             self._announce_places(tracked.stamp, [])  # there is one place now, and it has a topic
         if self._config.mode is Mode.BOOTSTRAP:
-            if self._transport.listeners(INITIAL_POSE) > self._pose_listeners:
+            before, self._pose_listeners = (
+                self._pose_listeners,
+                self._transport.listeners(INITIAL_POSE),
+            )
+            if self._pose_listeners > before:
                 self._announce_initial(tracked)  # to an AMCL that came late
             return
         make, amcl, stamp = self._transport.make, self._config.amcl, tracked.stamp

@@ -100,6 +100,8 @@ class Intake:
             return self._take_map(message)
         if heard is Heard.INITIAL_POSE:
             return self._take_hint(message)
+        if heard is Heard.INPUT:
+            return [message]
         if heard is Heard.RESET:
             return [Reset(self._now)]
         if heard is Heard.UPDATE:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 import traceback
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,9 @@ from firstfix.system.config import LocalizerConfig
 from firstfix.system.inputs import Input, NewMap
 from firstfix.system.localizer import Localizer
 from firstfix.system.node_config import NodeConfig
+from firstfix.system.outputs import Output
+
+Watcher = Callable[[Input, list[Output], Localizer], None]
 
 # One sentence on one subject is said that often at most.
 _REPEAT_S = 10.0
@@ -37,11 +41,16 @@ class Node:
         Settings.
     transport : Transport
         What messages are made with and sent to; called from the worker only.
+    watchers : sequence of Watcher
+        Who else is told what came in and what it led to, such as the live page; from the worker.
     """
 
-    def __init__(self, config: NodeConfig, transport: Transport) -> None:
+    def __init__(
+        self, config: NodeConfig, transport: Transport, watchers: Sequence[Watcher] = ()
+    ) -> None:
         self._config = config
         self._transport = transport
+        self._watchers = watchers
         self._inbox: Inbox[tuple[Heard, Any]] = Inbox()
         self._intake = Intake(config.amcl, self._complain)
         self._announcer = Announcer(config, transport)
@@ -72,6 +81,16 @@ class Node:
         put = self._inbox.put_scan if heard is Heard.SCAN else self._inbox.put
         put((heard, message))
 
+    def give(self, given: Input) -> None:
+        """Take in what needs no conversion, such as the word of a person on the live page.
+
+        Parameters
+        ----------
+        given : Input
+            What happened.
+        """
+        self.hear(Heard.INPUT, given)
+
     def _work(self) -> None:
         self._try(self._make_ready)
         while not self._inbox.is_closed:
@@ -97,6 +116,8 @@ class Node:
         for given in inputs:
             outputs = self._localizer.handle(given)
             self._announcer.announce(outputs, self._localizer.particles)
+            for watch in self._watchers:
+                watch(given, outputs, self._localizer)
 
     def _try(self, step: Any, *given: Any) -> None:
         """Do something that must not end the node, whatever came over the wire."""

@@ -51,6 +51,7 @@ class Heard(Enum):
     KIDNAPPED = "kidnapped"
     RESET = "reinitialize_global_localization"
     UPDATE = "request_nomotion_update"
+    INPUT = "input"
 
 
 POSE_TYPE = "geometry_msgs/PoseWithCovarianceStamped"
