@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 import traceback
@@ -28,8 +29,10 @@ Watcher = Callable[[Input, list[Output], Localizer], None]
 
 # One sentence on one subject is said that often at most.
 _REPEAT_S = 10.0
-# Without a message for so long, the worker looks what is missing.
-_IDLE_S = 5.0
+# How often the worker looks what is missing, s.
+_LOOK_S = 5.0
+# The end does not wait longer than that for a thought, such as the compiler's, s.
+_END_S = 3.0
 
 
 class Node:
@@ -57,16 +60,26 @@ class Node:
         self._localizer = Localizer(LocalizerConfig(amcl=config.amcl), cache_folder())
         self._said_at: dict[str, float] = {}
         self._heard: set[Heard] = set()
+        self._looked_at = math.inf
+        self._own_map: NewMap | None = None
         self._worker = threading.Thread(target=self._work, name="firstfix", daemon=True)
 
     def start(self) -> None:
-        """Begin to think; kernels and map are made ready first."""
+        """Begin to think; kernels and map are made ready first.
+
+        Raises
+        ------
+        InputError
+            If the file of the map cannot be used.
+        """
+        if self._config.yaml_filename:
+            self._own_map = NewMap(0.0, load_map(Path(self._config.yaml_filename)))
         self._worker.start()
 
     def stop(self) -> None:
-        """End, after what is being thought now."""
+        """End, after what is being thought now, unless that takes long."""
         self._inbox.close()
-        self._worker.join()
+        self._worker.join(_END_S)
 
     def hear(self, heard: Heard, message: Any = None) -> None:
         """Take in a message or a request; returns at once.
@@ -93,19 +106,18 @@ class Node:
 
     def _work(self) -> None:
         self._try(self._make_ready)
+        self._looked_at = time.monotonic()
         while not self._inbox.is_closed:
-            items = self._inbox.take(_IDLE_S)
-            for heard, message in items:
+            for heard, message in self._inbox.take(_LOOK_S):
                 self._heard.add(heard)
                 self._try(self._take, heard, message)
-            if not items:
+            if time.monotonic() - self._looked_at >= _LOOK_S:
                 self._say_what_is_missing()
 
     def _make_ready(self) -> None:
         warm_up(self._config.amcl)
-        if self._config.yaml_filename:
-            grid = load_map(Path(self._config.yaml_filename))
-            self._give(self._intake.use_map(NewMap(0.0, grid)))
+        if self._own_map is not None:
+            self._give(self._intake.use_map(self._own_map))
 
     def _take(self, heard: Heard, message: Any) -> None:
         if heard is Heard.INITIAL_POSE and self._announcer.is_own(message):
@@ -135,8 +147,13 @@ class Node:
             self._transport.log(Gravity.WARNING, text)
 
     def _say_what_is_missing(self) -> None:
+        """Name the topics that were silent since the last look; whether others spoke or not."""
+        self._looked_at = time.monotonic()
         topics = heard_topics(self._config)
-        for heard in (Heard.MAP, Heard.TF, Heard.SCAN):
+        for heard in (Heard.MAP, Heard.SCAN):
             if heard in topics and heard not in self._heard:
-                text = f"nothing heard on {topics[heard].name} ({topics[heard].type_name}) so far"
+                topic = topics[heard]
+                text = f"nothing heard on {topic.name} ({topic.type_name}) for {_LOOK_S:.0f} s"
                 self._complain(heard.value, text)
+        # A map is told once; what is wrong with odometry, every scan tells.
+        self._heard &= {Heard.MAP}
