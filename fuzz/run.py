@@ -1,0 +1,37 @@
+"""Coverage-guided fuzzing of one reader, by atheris (libFuzzer).
+
+``python fuzz/run.py carmen -max_total_time=600``: what breaks the reader is written into the current
+folder as ``crash-...``; once mended, it belongs into ``fuzz/inputs/<target>/``, where a test tries it
+again.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+import atheris
+
+with atheris.instrument_imports(include=["firstfix", "rosbags"]):
+    from targets import TARGETS, seeds, try_one
+
+
+def main() -> None:
+    """Fuzz the target that the first argument names; the others are libFuzzer's."""
+    if len(sys.argv) < 2 or sys.argv[1] not in TARGETS:
+        sys.exit(f"expected one of {', '.join(TARGETS)}")
+    name = sys.argv.pop(1)
+    corpus = Path(tempfile.mkdtemp(prefix=f"firstfix-corpus-{name}-"))
+    work = Path(tempfile.mkdtemp(prefix="firstfix-seeds-"))
+    for i, data in enumerate(seeds(name, work)):
+        (corpus / f"seed{i}").write_bytes(data)
+    kept = Path(__file__).parent / "inputs" / name
+    folders = [str(corpus), *([str(kept)] if kept.is_dir() else [])]
+    limits = ["-timeout=20", "-rss_limit_mb=3000", "-max_len=20000"]
+    atheris.Setup([*sys.argv, *limits, *folders], lambda data: try_one(name, data))
+    atheris.Fuzz()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,205 @@
+"""What is fuzzed: every reader, with bytes that somebody else chose.
+
+A target takes bytes, and may raise nothing but errors of ours; `seeds` makes good ones.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_typestore
+
+from firstfix.core.errors import FirstfixError
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.se2 import SE2
+from firstfix.formats.amcl_yaml import load_amcl_config
+from firstfix.formats.map_check import check_map
+from firstfix.formats.map_server import load_map, save_map
+from firstfix.formats.recording import load_recording
+from firstfix.formats.saved_pose import SavedPose, load_pose, save_pose
+from firstfix.formats.tum import load_tum
+
+MAX_CELLS = 1_000_000
+_HEADER = b"image: map.%s\nresolution: 0.05\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n"
+_THRESHOLDS = b"occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+_CARMEN = (
+    b"PARAM laser_front_laser_resolution 1.0\n"
+    b"FLASER 5 1.0 1.1 1.2 1.3 1.4 0.1 0.2 0.3 0.1 0.2 0.3 100.5 host 0.5\n"
+    b"ODOM 0.1 0.2 0.3 0.0 0.0 0.0 100.6 host 0.6\n"
+    b"ROBOTLASER1 0 -1.57 3.14 0.78 80.0 0.01 0 5 1.0 1.1 1.2 1.3 1.4 0 "
+    b"0.1 0.2 0.3 0.1 0.2 0.3 0.0 0.0 0.0 0.0 0.0 101.0 host 1.0\n"
+)
+
+Target = Callable[[bytes, Path], None]
+
+
+def read_map_yaml(data: bytes, folder: Path) -> None:
+    """Read a YAML beside a good image."""
+    (folder / "map.pgm").write_bytes(b"P5 3 2 255\n" + bytes([0, 205, 254, 0, 205, 254]))
+    (folder / "map.yaml").write_bytes(data)
+    load_map(folder / "map.yaml", MAX_CELLS)
+    check_map(folder / "map.yaml")
+
+
+def _image_of(kind: str) -> Target:
+    def read(data: bytes, folder: Path) -> None:
+        (folder / "map.yaml").write_bytes(_HEADER % kind.encode() + _THRESHOLDS)
+        (folder / f"map.{kind}").write_bytes(data)
+        load_map(folder / "map.yaml", MAX_CELLS)
+
+    return read
+
+
+def _recording_of(kind: str) -> Target:
+    def read(data: bytes, folder: Path) -> None:
+        path = folder / f"drive{kind}"
+        path.write_bytes(data)
+        load_recording(path, max_scans=50)
+
+    return read
+
+
+def read_npz_member(data: bytes, folder: Path) -> None:
+    """Read an archive that is whole, with an array that is not: checksums stop raw mutations."""
+    path = folder / "drive.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("ranges.npy", data)
+        for name, value in (("angle_min", -1.0), ("angle_increment", 0.1)):
+            archive.writestr(f"{name}.npy", _npy(np.float64(value)))
+        archive.writestr("range_min.npy", _npy(np.float64(0.1)))
+        archive.writestr("range_max.npy", _npy(np.float64(10.0)))
+    load_recording(path, max_scans=50)
+
+
+def read_parameters(data: bytes, folder: Path) -> None:
+    """Read a parameter file of Nav2."""
+    (folder / "nav2.yaml").write_bytes(data)
+    load_amcl_config(folder / "nav2.yaml")
+
+
+def read_saved_pose(data: bytes, folder: Path) -> None:
+    """Read a saved pose."""
+    (folder / "pose.json").write_bytes(data)
+    load_pose(folder / "pose.json")
+
+
+def read_tum(data: bytes, folder: Path) -> None:
+    """Read a trajectory."""
+    (folder / "track.tum").write_bytes(data)
+    load_tum(folder / "track.tum")
+
+
+TARGETS: dict[str, Target] = {
+    "map_yaml": read_map_yaml,
+    "map_pgm": _image_of("pgm"),
+    "map_png": _image_of("png"),
+    "map_bmp": _image_of("bmp"),
+    "npz": _recording_of(".npz"),
+    "npz_member": read_npz_member,
+    "carmen": _recording_of(".log"),
+    "carmen_gz": _recording_of(".log.gz"),
+    "bag1": _recording_of(".bag"),
+    "bag2_db3": _recording_of(".db3"),
+    "bag2_mcap": _recording_of(".mcap"),
+    "parameters": read_parameters,
+    "saved_pose": read_saved_pose,
+    "tum": read_tum,
+}
+
+
+def try_one(name: str, data: bytes) -> None:
+    """Give bytes to a target; anything that is not an error of ours goes through."""
+    with tempfile.TemporaryDirectory(prefix="firstfix-fuzz-") as folder, suppress(FirstfixError):
+        TARGETS[name](data, Path(folder))
+
+
+def seeds(name: str, folder: Path) -> Iterator[bytes]:
+    """Make good inputs of a target."""
+    if name == "map_yaml":
+        yield _HEADER % b"pgm" + _THRESHOLDS
+        yield _HEADER % b"pgm" + _THRESHOLDS + b"mode: scale\n"
+    elif name.startswith("map_"):
+        yield from _images(name.removeprefix("map_"), folder)
+    elif name == "npz_member":
+        yield _npy(np.linspace(0.5, 5.0, 20, dtype=np.float32).reshape(2, 10))
+    elif name == "npz":
+        buffer = io.BytesIO()
+        ranges = np.ones((2, 10), np.float32)
+        np.savez(buffer, ranges=ranges, angle_min=-1.0, angle_increment=0.1, range_min=0.1,
+                 range_max=10.0, true_pose=np.zeros((2, 3)))  # fmt: skip
+        yield buffer.getvalue()
+    elif name.startswith("carmen"):
+        yield _CARMEN if name == "carmen" else gzip.compress(_CARMEN)
+    elif name.startswith("bag"):
+        yield _bag(name, folder)
+    elif name == "parameters":
+        yield b"amcl:\n  ros__parameters:\n    max_beams: 60\n    initial_pose: {x: 1.0, y: 2.0}\n"
+    elif name == "saved_pose":
+        saved = SavedPose(SE2(1.0, 2.0, 0.5), np.eye(3), 10.0, SE2(0.0, 0.0, 0.0), "key")
+        save_pose(folder / "pose.json", saved)
+        yield (folder / "pose.json").read_bytes()
+    else:
+        yield b"# t x y z qx qy qz qw\n1.0 2.0 3.0 0.0 0.0 0.0 0.0 1.0\n"
+
+
+def _images(kind: str, folder: Path) -> Iterator[bytes]:
+    from PIL import Image
+
+    grid = OccupancyGrid(np.array([[0, 100, -1], [0, 0, 100]], np.int8), 0.05)
+    save_map(grid, folder / "seed.yaml")
+    image = Image.open(next(p for p in folder.glob("seed.*") if p.suffix != ".yaml"))
+    for mode in ("L",) if kind == "pgm" else ("L", "RGB", "P", "RGBA"):
+        if kind == "bmp" and mode == "RGBA":
+            continue
+        buffer = io.BytesIO()
+        image.convert(mode).save(buffer, "PPM" if kind == "pgm" else kind.upper())
+        yield buffer.getvalue()
+    if kind == "pgm":
+        yield b"P2 3 2 15\n0 1 2 3 4 15\n"
+
+
+def _bag(name: str, folder: Path) -> bytes:
+    if name == "bag1":
+        store, path = get_typestore(Stores.ROS1_NOETIC), folder / "seed.bag"
+        with Writer1(path) as writer:
+            connection = writer.add_connection(
+                "/scan", "sensor_msgs/msg/LaserScan", typestore=store
+            )
+            message = _scan(store, seq=0)
+            raw = store.serialize_ros1(message, "sensor_msgs/msg/LaserScan")
+            writer.write(connection, 10**9, raw)
+        return path.read_bytes()
+    store, path = get_typestore(Stores.ROS2_HUMBLE), folder / "seed"
+    plugin = StoragePlugin.MCAP if name.endswith("mcap") else StoragePlugin.SQLITE3
+    with Writer2(path, version=9, storage_plugin=plugin) as writer2:
+        topic = writer2.add_connection("/scan", "sensor_msgs/msg/LaserScan", typestore=store)
+        raw = store.serialize_cdr(_scan(store), "sensor_msgs/msg/LaserScan")
+        writer2.write(topic, 10**9, raw)
+    return next(p for p in path.iterdir() if p.suffix != ".yaml").read_bytes()
+
+
+def _scan(store: object, **head: int) -> object:
+    types = store.types  # type: ignore[attr-defined]
+    stamp = types["builtin_interfaces/msg/Time"](sec=1, nanosec=5)
+    header = types["std_msgs/msg/Header"](**head, stamp=stamp, frame_id="laser")
+    return types["sensor_msgs/msg/LaserScan"](
+        header=header, angle_min=-1.0, angle_max=1.0, angle_increment=0.2, time_increment=0.0,
+        scan_time=0.0, range_min=0.1, range_max=10.0, ranges=np.ones(10, np.float32),
+        intensities=np.empty(0, np.float32),
+    )  # fmt: skip
+
+
+def _npy(array: np.ndarray) -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, array)
+    return buffer.getvalue()
