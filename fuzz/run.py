@@ -1,8 +1,8 @@
 """Coverage-guided fuzzing of one reader, by atheris (libFuzzer).
 
-``python fuzz/run.py carmen -max_total_time=600``: what breaks the reader is written into the current
-folder as ``crash-...``; once mended, it belongs into ``fuzz/inputs/<target>/``, where a test tries it
-again.
+``python fuzz/run.py carmen -max_total_time=600``: what breaks the reader is written into the
+current folder as ``crash-...``; once mended, it belongs into ``fuzz/inputs/<target>/``, where a
+test tries it again.
 """
 
 from __future__ import annotations
