@@ -15,7 +15,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields, build_fields
 from firstfix.global_localization.answer import to_cells
 from firstfix.global_localization.beams import usable_beams
-from firstfix.global_localization.examine import examine, locate_near
+from firstfix.global_localization.examine import examine, locate_near, sort_beams
 from firstfix.global_localization.verify import verify
 from firstfix.sim.lidar import Lidar
 from firstfix.sim.office import office
@@ -210,3 +210,14 @@ def test_what_a_hand_over_the_sensor_leaves_is_not_found_within_a_wall(office_fi
         place = locate_near(dataclasses.replace(scan, ranges=hand), truth, office_fields)
         column, row, _ = to_cells(grid, scan, place.pose).astype(int)
         assert not grid.occupied[row, column] or place.score > 2.3
+
+
+def test_all_beams_are_sorted_and_few_enough_as_they_are_counted(hall):
+    (pose,) = drawn(hall, 1)
+    scan = seen(hall, pose)
+    (judged,) = examine(scan, [pose], hall)
+    classes = sort_beams(scan, judged.pose, hall)
+    assert len(classes) == len(usable_beams(scan)) == judged.evidence.beams
+    shares = np.bincount(classes, minlength=4) / len(classes)
+    e = judged.evidence
+    assert shares.tolist() == [e.explained, e.short, e.through_wall, e.unknown]

@@ -10,7 +10,13 @@ from hypothesis import strategies as st
 from firstfix.core.grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.fields.map_fields import MapFields, build_fields
 from firstfix.global_localization.beams import Beams
-from firstfix.global_localization.verify import EXPLAINED, SHORT, THROUGH, verify
+from firstfix.global_localization.verify import (
+    EXPLAINED,
+    SHORT,
+    THROUGH,
+    classes_of_beams,
+    verify,
+)
 from firstfix.global_localization.verify import UNKNOWN as IN_UNKNOWN
 
 RESOLUTION = 0.05
@@ -55,6 +61,7 @@ ONE_BEAM = [
 def test_one_beam(yard, bearing, range_m, hit, kind):
     counts = verify(SENSOR, beam(bearing, range_m, hit=hit), yard).counts
     assert counts.tolist() == [[int(k == kind) for k in range(4)]]
+    assert classes_of_beams(SENSOR[0], beam(bearing, range_m, hit=hit), yard).tolist() == [kind]
 
 
 def test_what_nobody_has_seen_is_unknown_whatever_the_thresholds_say(yard):

@@ -17,6 +17,7 @@ from firstfix.adapters.topics import Heard, heard_topics
 from firstfix.adapters.transport import Gravity, Transport
 from firstfix.adapters.warm_up import warm_up
 from firstfix.core.errors import InputError
+from firstfix.core.scan import LaserScan
 from firstfix.fields.cache import cache_folder
 from firstfix.formats.map_server import load_map
 from firstfix.system.config import LocalizerConfig
@@ -91,7 +92,8 @@ class Node:
         message : message
             None for a request.
         """
-        put = self._inbox.put_scan if heard is Heard.SCAN else self._inbox.put
+        is_scan = heard is Heard.SCAN or isinstance(message, LaserScan)
+        put = self._inbox.put_scan if is_scan else self._inbox.put
         put((heard, message))
 
     def give(self, given: Input) -> None:

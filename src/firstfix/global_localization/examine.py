@@ -17,7 +17,7 @@ from firstfix.global_localization.answer import to_cells, verified_place
 from firstfix.global_localization.beams import Beams, usable_beams
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.verdict import place_probabilities
-from firstfix.global_localization.verify import Verification, verify
+from firstfix.global_localization.verify import Verification, classes_of_beams, verify
 
 # Refinement may mend what a tracker leaves open, not find another place.
 _SAME_PLACE_M = 0.3
@@ -95,6 +95,28 @@ def locate_near(scan: LaserScan, T_map_base: SE2, fields: MapFields) -> Hypothes
     i = int(np.argmin(verification.scores))
     probability = _alone(verification, i, beams)
     return verified_place(fields.grid, scan, verification, i, covariances[0], probability)
+
+
+def sort_beams(scan: LaserScan, T_map_base: SE2, fields: MapFields) -> NDArray[np.uint8]:
+    """Tell of each beam what the map says to it at a pose.
+
+    Parameters
+    ----------
+    scan : LaserScan
+        The scan, with the sensor's pose on the robot.
+    T_map_base : SE2
+        Where the robot is taken to be.
+    fields : MapFields
+        The prepared map.
+
+    Returns
+    -------
+    ndarray of uint8
+        For the beams of `usable_beams`, in their order: what
+        `firstfix.global_localization.verify.classes_of_beams` returns.
+    """
+    pose = to_cells(fields.grid, scan, T_map_base)
+    return classes_of_beams(pose, usable_beams(scan), fields)
 
 
 def _alone(verification: Verification, i: int, beams: Beams) -> float:

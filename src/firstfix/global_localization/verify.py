@@ -79,13 +79,44 @@ def verify(poses: NDArray[np.float64], beams: Beams, fields: MapFields) -> Verif
     Verification
         Poses with costs and evidence, in their order.
     """
-    used = beams.thinned(BEAMS)
+    scores, counts, _ = _compared(poses, beams.thinned(BEAMS), fields)
+    return Verification(poses, scores, counts)
+
+
+def classes_of_beams(
+    pose: NDArray[np.float64], beams: Beams, fields: MapFields
+) -> NDArray[np.uint8]:
+    """Sort the beams of a scan, all of them, by what the map says to them at one pose.
+
+    Parameters
+    ----------
+    pose : ndarray, shape (3,)
+        x, y (cells), heading (rad) of the sensor in the grid.
+    beams : Beams
+        The scan.
+    fields : MapFields
+        The prepared map.
+
+    Returns
+    -------
+    ndarray of uint8, shape (len(beams),)
+        `EXPLAINED`, `SHORT`, `THROUGH` or `UNKNOWN`.
+    """
+    _, _, classes = _compared(pose[None], beams, fields)
+    return classes[0]
+
+
+def _compared(
+    poses: NDArray[np.float64], used: Beams, fields: MapFields
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.uint8]]:
+    """Return scores (n,), counts (n, 4) and classes (n, beams)."""
     # Neighbours on a near wall repeat one another, far beams each see something else: between
     # counting every beam (weight 1) and every metre of wall (weight range) lies the root.
     weights = np.sqrt(used.ranges) * np.where(used.hit, 1.0, _NO_RETURN_WEIGHT)
     weights /= weights.sum()
     scores = np.empty(len(poses))
     counts = np.zeros((len(poses), 4), np.int64)
+    classes = np.empty((len(poses), len(used)), np.uint8)
     _verify(
         poses,
         np.cos(used.bearings),
@@ -100,8 +131,9 @@ def verify(poses: NDArray[np.float64], beams: Beams, fields: MapFields) -> Verif
         fields.grid.resolution,
         scores,
         counts,
+        classes,
     )
-    return Verification(poses, scores, counts)
+    return scores, counts, classes
 
 
 @njit(cache=True, nogil=True)
@@ -119,6 +151,7 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
     resolution: float,
     scores: NDArray[np.float64],
     counts: NDArray[np.int64],
+    classes: NDArray[np.uint8],
 ) -> None:
     height, width = squares.shape
     for k in range(poses.shape[0]):
@@ -129,6 +162,7 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
             # No sensor sees from within a wall, though all that is very near would fit there.
             scores[k] = _INSIDE_WALL_COST
             counts[k, THROUGH] = ranges.shape[0]
+            classes[k] = THROUGH
             continue
         for i in range(ranges.shape[0]):
             dx = cos * cosines[i] - sin * sines[i]
@@ -144,7 +178,8 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
                 differs += _THROUGH_COST
             if not hit[i]:
                 cost += weights[i] * differs
-                counts[k, THROUGH if through else EXPLAINED] += 1
+                classes[k, i] = THROUGH if through else EXPLAINED
+                counts[k, classes[k, i]] += 1
                 continue
             x = math.floor(poses[k, 0] + ranges[i] / resolution * dx)
             y = math.floor(poses[k, 1] + ranges[i] / resolution * dy)
@@ -153,11 +188,12 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
             near = math.exp(-0.5 * (distance / _SIGMA_M) ** 2)
             cost += weights[i] * (differs - math.log(_INLIER * near + _OUTLIER))
             if through:
-                counts[k, THROUGH] += 1
+                classes[k, i] = THROUGH
             elif distance <= _EXPLAINED_M:
-                counts[k, EXPLAINED] += 1
+                classes[k, i] = EXPLAINED
             elif not inside or unknown[y, x]:
-                counts[k, UNKNOWN] += 1
+                classes[k, i] = UNKNOWN
             else:
-                counts[k, SHORT] += 1
+                classes[k, i] = SHORT
+            counts[k, classes[k, i]] += 1
         scores[k] = cost

@@ -73,6 +73,33 @@ def run(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Iterator[Moment]:
     InputError
         If the robot shall begin, or be put, where it does not fit, or drive where no way leads.
     """
+    stage = set_stage(scenario, grid, seed)
+    for phase in scenario.phases:
+        yield from phase.play(stage)
+
+
+def set_stage(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Stage:
+    """Prepare a scenario: the robot stands at its beginning, and nothing has happened yet.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The script; its phases tell where there must be no furniture.
+    grid : OccupancyGrid
+        The map of the building.
+    seed : int
+        Where chance begins.
+
+    Returns
+    -------
+    Stage
+        Ready to be played on.
+
+    Raises
+    ------
+    InputError
+        As `run`.
+    """
     for_building, for_stage = np.random.SeedSequence(seed).spawn(2)
     rng = np.random.default_rng(for_building)
     start = scenario.start if scenario.start is not None else random_free_pose(grid, rng)
@@ -81,13 +108,18 @@ def run(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Iterator[Moment]:
         grid = furnished(grid, scenario.furniture, rng, keep_free)
     floor = Floor(grid)
     for place in (start, *(place for phase in scenario.phases for place in phase.places)):
-        _check_room(floor, place, scenario.kobuki.radius_m)
-    stage = Stage(floor, scenario.kobuki, scenario.lidar, scenario.shutter, start, for_stage)
-    for phase in scenario.phases:
-        yield from phase.play(stage)
+        check_room(floor, place, scenario.kobuki.radius_m)
+    return Stage(floor, scenario.kobuki, scenario.lidar, scenario.shutter, start, for_stage)
 
 
-def _check_room(floor: Floor, place: SE2, radius_m: float) -> None:
+def check_room(floor: Floor, place: SE2, radius_m: float) -> None:
+    """Refuse a place in the map frame that has less room (m) around it than the robot needs.
+
+    Raises
+    ------
+    InputError
+        If it has.
+    """
     room = floor.room_at(place.x, place.y)
     if room < radius_m:
         raise InputError(

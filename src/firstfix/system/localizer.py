@@ -90,6 +90,11 @@ class Localizer:
         """The belief; None while there is none."""
         return self._track.state.particles if self._track is not None else None
 
+    @property
+    def locator(self) -> Locator | None:
+        """The static stage on the map in use; None before the first map."""
+        return None if self.state is State.NO_MAP else self._locator
+
     def handle(self, given: Input) -> list[Output]:
         """Take in what happened.
 
