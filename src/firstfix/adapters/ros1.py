@@ -8,9 +8,11 @@ from typing import Any
 
 import nav_msgs.srv
 import rospy
+from rospy.numpy_msg import numpy_msg
 
 from firstfix.adapters.node import Node
 from firstfix.adapters.parameters import configured, flattened
+from firstfix.adapters.ros1_master import is_forgotten, register_anew
 from firstfix.adapters.ros1_types import Empty, decoded, make, message_class
 from firstfix.adapters.topics import (
     PARTICLE_POSES,
@@ -21,11 +23,14 @@ from firstfix.adapters.topics import (
     said_topics,
 )
 from firstfix.adapters.transport import Gravity
+from firstfix.core.errors import InputError
 from firstfix.system.node_config import NodeConfig
 
 # Messages that wait for slow subscribers; after that the oldest are dropped.
 _QUEUE = 10
 _MASTER_CHECK_S = 1.0
+# A map server that could not be asked is asked again after, s.
+_ASK_AGAIN_S = 2.0
 _LOG = {
     Gravity.INFO: rospy.loginfo,
     Gravity.WARNING: rospy.logwarn,
@@ -50,20 +55,8 @@ class Ros1:
     particles = PARTICLE_POSES
 
     def __init__(self, config: NodeConfig) -> None:
-        self._config = config
-        self._publishers: dict[str, rospy.Publisher] = {}
-        self._others: list[Any] = []
-
-    def connect(self, node: Node) -> None:
-        """Advertise and subscribe all; if that was done before, anew: the master has changed."""
-        for old in (*self._publishers.values(), *self._others):
-            (old.shutdown if isinstance(old, rospy.Service) else old.unregister)()
-        topics = said_topics(self._config, PARTICLE_POSES)
+        topics = said_topics(config, PARTICLE_POSES)
         self._publishers = {topic.name: _publisher(topic) for topic in topics}
-        self._others = [
-            *(_subscriber(t, partial(node.hear, h)) for h, t in heard_topics(self._config).items()),
-            *(rospy.Service(name, Empty, partial(_ask, node, h)) for name, h in _SERVICES.items()),
-        ]
 
     def make(self, type_name: str, /, **fields: Any) -> Any:
         """Build a message."""
@@ -99,37 +92,50 @@ def run(arguments: list[str]) -> None:
     InputError
         If a parameter cannot be used.
     """
-    rospy.init_node("firstfix", argv=["firstfix", *arguments])
+    if not _has_begun(arguments):
+        return
     values = flattened(rospy.get_param("~", {}))
-    uses_topic = values.pop("use_map_topic", True)
+    uses_topic = _switch("use_map_topic", values.pop("use_map_topic", True))
     config = configured(values)
-    transport = Ros1(config)
-    node = Node(config, transport)
+    node = Node(config, Ros1(config))
     node.start()
-    transport.connect(node)
-    if not uses_topic and not config.yaml_filename:
+    heard = heard_topics(config)
+    if not uses_topic and heard.pop(Heard.MAP, None) is not None:
         threading.Thread(target=_ask_for_map, args=(node,), daemon=True).start()
-    _spin(transport, node)
+    for what, topic in heard.items():
+        _subscribe(topic, partial(node.hear, what))
+    services = [
+        rospy.Service(name, Empty, partial(_ask, node, what)) for name, what in _SERVICES.items()
+    ]
+    _spin(services)
     node.stop()
 
 
-def _spin(transport: Ros1, node: Node) -> None:
+def _has_begun(arguments: list[str]) -> bool:
+    """Register with the master; false if the end came while there was none."""
+    try:
+        rospy.init_node("firstfix", argv=["firstfix", *arguments])
+    except rospy.ROSInitException as error:
+        if rospy.is_shutdown():
+            return False
+        raise InputError(
+            expected="a node that ROS can start",
+            received=str(error),
+            remedy="look at ROS_MASTER_URI, ROS_IP and the arguments",
+        ) from error
+    return True
+
+
+def _spin(services: list[rospy.Service]) -> None:
     """Wait for the end; meanwhile, rospy does not notice when another master takes over."""
-    known = _master_pid()
+    is_known = True
     while not rospy.is_shutdown():
         rospy.rostime.wallsleep(_MASTER_CHECK_S)
-        now = _master_pid()
-        if now is not None and known is not None and now != known:
-            transport.log(Gravity.WARNING, "the master was restarted: registering anew")
-            transport.connect(node)
-        known = now or known
-
-
-def _master_pid() -> int | None:
-    try:
-        return int(rospy.get_master().getPid()[2])
-    except (OSError, rospy.ROSException):
-        return None
+        if is_known and is_forgotten():
+            rospy.logwarn("the master was restarted: registering anew")
+            is_known = False
+        if not is_known:
+            is_known = register_anew(services)
 
 
 def _publisher(topic: Topic) -> rospy.Publisher:
@@ -142,11 +148,21 @@ def _publisher(topic: Topic) -> rospy.Publisher:
     )
 
 
-def _subscriber(topic: Topic, hear: Any) -> rospy.Subscriber:
+def _subscribe(topic: Topic, hear: Any) -> None:
     if topic.type_name.startswith("kobuki/"):
-        return rospy.Subscriber(topic.name, rospy.AnyMsg, lambda message: hear(decoded(message)))
-    kind = message_class(topic.type_name)
-    return rospy.Subscriber(topic.name, kind, hear, tcp_nodelay=True)
+        rospy.Subscriber(topic.name, rospy.AnyMsg, lambda message: hear(decoded(message)))
+        return
+    # Long lists come as arrays: a tuple of the cells of a large map takes half a second.
+    kind = numpy_msg(message_class(topic.type_name))
+    rospy.Subscriber(topic.name, kind, hear, tcp_nodelay=True)
+
+
+def _switch(name: str, value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise InputError(
+            expected=f"{name} as true or false", received=f"{value!r:.60}", remedy="write true"
+        )
+    return value
 
 
 def _ask(node: Node, heard: Heard, _: Any) -> Any:
@@ -156,5 +172,19 @@ def _ask(node: Node, heard: Heard, _: Any) -> Any:
 
 def _ask_for_map(node: Node) -> None:
     """Fetch the map by the service, as AMCL does unless it is told to use the topic."""
-    rospy.wait_for_service("static_map")
-    node.hear(Heard.MAP, rospy.ServiceProxy("static_map", nav_msgs.srv.GetMap)().map)
+    while not rospy.is_shutdown():
+        grid = _map_of_service()
+        if grid is not None:
+            node.hear(Heard.MAP, grid)
+            return
+        rospy.rostime.wallsleep(_ASK_AGAIN_S)
+
+
+def _map_of_service() -> Any:
+    try:
+        rospy.wait_for_service("static_map", timeout=_ASK_AGAIN_S)
+        return rospy.ServiceProxy("static_map", nav_msgs.srv.GetMap)().map
+    except (rospy.ROSException, rospy.ServiceException) as error:
+        if not rospy.is_shutdown():
+            rospy.logwarn_throttle(10.0, f"no map from the service static_map yet: {error}")
+        return None
