@@ -4,9 +4,11 @@ import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.recording import Recording
@@ -14,6 +16,54 @@ from firstfix.core.se2 import SE2
 from firstfix.core.trajectory import Trajectory
 from firstfix.sim.drawing import Drawing
 from firstfix.sim.lidar import Lidar
+
+# Of packages that neither of the stores has.
+DEFINITIONS = {
+    "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms",
+    "nav2_msgs/msg/Particle": "geometry_msgs/Pose pose\nfloat64 weight",
+    "nav2_msgs/msg/ParticleCloud": "std_msgs/Header header\nParticle[] particles",
+    "kobuki/msg/CliffEvent": "uint8 sensor\nuint8 state\nuint16 bottom",
+    "kobuki/msg/WheelDropEvent": "uint8 wheel\nuint8 state",
+    "kobuki/msg/BumperEvent": "uint8 bumper\nuint8 state",
+}
+
+
+class Wire:
+    """Real messages of one ROS, and what is left of them at the other end."""
+
+    def __init__(self, store: Stores) -> None:
+        self._store = get_typestore(store)
+        self.is_ros1 = store is Stores.ROS1_NOETIC
+        for name, definition in DEFINITIONS.items():
+            if name not in self._store.types:
+                self._store.register(get_types_from_msg(definition, name))
+
+    def make(self, type_name: str, /, **fields: Any) -> Any:
+        """Build a message of ``package/Type``, as transports do."""
+        if self.is_ros1 and type_name == "std_msgs/Header":
+            fields["seq"] = 0
+        return self._store.types[type_name.replace("/", "/msg/")](**fields)
+
+    def sent(self, message: Any) -> Any:
+        """Write a message to bytes, and read these."""
+        kind = message.__msgtype__
+        if self.is_ros1:
+            return self._store.deserialize_ros1(self._store.serialize_ros1(message, kind), kind)
+        return self._store.deserialize_cdr(self._store.serialize_cdr(message, kind), kind)
+
+
+@pytest.fixture(
+    scope="session", params=[Stores.ROS1_NOETIC, Stores.ROS2_HUMBLE], ids=["ros1", "ros2"]
+)
+def wire(request: pytest.FixtureRequest) -> Wire:
+    """Give the messages of ROS 1, then of ROS 2."""
+    return Wire(request.param)
+
+
+@pytest.fixture(scope="session")
+def ros2() -> Wire:
+    """Give the messages of ROS 2."""
+    return Wire(Stores.ROS2_HUMBLE)
 
 
 @pytest.fixture(scope="session")

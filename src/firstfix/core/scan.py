@@ -117,13 +117,13 @@ class LaserScan:
     def hit(self) -> NDArray[np.bool_]:
         """Beams that measured a surface, shape (n,)."""
         r = self.ranges
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             return (r >= self.range_min) & (r > 0.0) & (r < self.range_max)
 
     @cached_property
     def no_return(self) -> NDArray[np.bool_]:
         """Beams that met nothing within range, shape (n,): evidence of open space."""
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             return (self.ranges >= self.range_max) & (self.ranges > 0.0)
 
     def points(self) -> NDArray[np.float64]:

@@ -10,8 +10,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from firstfix.core.errors import MapError, ScanError
+from firstfix.core.errors import InputError, MapError, ScanError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan, Mounting
 from firstfix.core.se2 import SE2
@@ -19,7 +20,7 @@ from firstfix.core.se2 import SE2
 # A unit quaternion that lost more than this is not a rotation any more.
 MIN_NORM = 1e-3
 
-INT8_MAX = 127
+_MAP_REMEDY = "look for the node that publishes the map"
 
 
 class StampedTransform(NamedTuple):
@@ -133,28 +134,26 @@ def to_grid(message: Any) -> OccupancyGrid:
         If the message cannot describe a map.
     """
     info = message.info
-    # rclpy has an array.array here, rospy a tuple, rosbags an ndarray.
-    data = np.array(message.data)
-    if data.size != info.height * info.width or (data.size and abs(data).max() > INT8_MAX):
+    cells, height, width = _cells(message.data), int(info.height), int(info.width)
+    if cells.size != height * width:
         raise MapError(
-            expected=f"{info.width} x {info.height} cells from -1 to 100",
-            received=f"{data.size} numbers",
-            remedy="look for the node that publishes the map",
+            expected=f"{width} x {height} cells",
+            received=f"{cells.size}",
+            remedy=_MAP_REMEDY,
         )
-    origin = _normalized(info.origin.orientation)
-    x, y, yaw = _shadow((info.origin.position.x, info.origin.position.y), origin)
+    x, y, yaw = _shadow(
+        (info.origin.position.x, info.origin.position.y), _map_rotation(info.origin.orientation)
+    )
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):
         raise MapError(
-            expected="an origin of finite numbers",
-            received=f"({x}, {y}) and a yaw of {yaw}",
-            remedy="look for the node that publishes the map",
+            expected="an origin of the map with a position and a rotation",
+            received=f"position ({x}, {y}) and a yaw of {yaw}",
+            remedy=_MAP_REMEDY,
         )
-    return OccupancyGrid(
-        data.astype(np.int8).reshape(info.height, info.width),
+    with np.errstate(over="ignore"):  # infinite then, which no map is
         # 0.05 travels as 0.05000000074505806: what was meant is the shortest that reads the same.
-        float(str(np.float32(info.resolution))),
-        SE2(x, y, yaw),
-    )
+        resolution = float(str(np.float32(info.resolution)))
+    return OccupancyGrid(cells.reshape(height, width), resolution, SE2(x, y, yaw))
 
 
 def to_transform(message: Any) -> StampedTransform:
@@ -221,12 +220,22 @@ def to_pressed(message: Any) -> tuple[int, bool]:
     tuple of int and bool
         Which of the sensors of this kind (left, centre, right; 0 for a Bool), and whether it has
         begun to report: a cliff, a dropped wheel, a pressed bumper.
+
+    Raises
+    ------
+    InputError
+        If it is another message: who hears any type that is published takes what comes.
     """
-    if hasattr(message, "data"):
+    if isinstance(getattr(message, "data", None), (bool, np.bool_)):
         return 0, bool(message.data)
-    names = ("sensor", "wheel", "bumper")
-    which = next(getattr(message, name) for name in names if hasattr(message, name))
-    return int(which), bool(message.state)
+    for name in ("sensor", "wheel", "bumper"):
+        if hasattr(message, name) and hasattr(message, "state"):
+            return int(getattr(message, name)), bool(message.state)
+    raise InputError(
+        expected="an event of a Kobuki, or a std_msgs/Bool",
+        received=f"a {type(message).__name__.strip('_')} without their fields",
+        remedy="remap the topic to another name",
+    )
 
 
 def to_planar(transform: StampedTransform) -> SE2:
@@ -262,6 +271,31 @@ def planar(transform: StampedTransform) -> tuple[float, float, float]:
     return _shadow(transform.translation[:2], transform.rotation)
 
 
+def _cells(data: Any) -> NDArray[np.int8]:
+    """Copy the cells of a map, read-only; rclpy has an array.array, rospy a tuple or bytes."""
+    is_raw = isinstance(data, (bytes, bytearray, memoryview))
+    cells = np.frombuffer(data, np.int8) if is_raw else np.asarray(data)
+    limits = np.iinfo(np.int8)
+    is_whole = cells.dtype.kind in "iu" and cells.ndim == 1
+    if cells.size and not (is_whole and limits.min <= cells.min() <= cells.max() <= limits.max):
+        raise MapError(
+            expected="cells from -1 (unknown) over 0 (free) to 100 (occupied)",
+            received=f"{cells.dtype} cells"
+            + (f" from {cells.min()} to {cells.max()}" if is_whole else ""),
+            remedy=_MAP_REMEDY,
+        )
+    copy = cells.astype(np.int8)
+    copy.flags.writeable = False  # or the grid would copy it once more
+    return copy
+
+
+def _map_rotation(rotation: Any) -> tuple[float, float, float, float]:
+    """Return a unit quaternion; of a map that says none, rviz and AMCL think that it has none."""
+    if rotation.x == rotation.y == rotation.z == rotation.w == 0.0:
+        return 0.0, 0.0, 0.0, 1.0
+    return _normalized(rotation)
+
+
 def _shadow(
     translation: tuple[float, float], rotation: tuple[float, float, float, float]
 ) -> tuple[float, float, float]:
@@ -275,7 +309,7 @@ def _normalized(rotation: Any) -> tuple[float, float, float, float]:
     q = (float(rotation.x), float(rotation.y), float(rotation.z), float(rotation.w))
     norm = math.hypot(*q)
     # An unset quaternion is all zeros, which some nodes send for "not known"; others send NaN.
-    x, y, z, w = (v / norm for v in q) if norm > MIN_NORM else (math.nan,) * 4
+    x, y, z, w = (v / norm for v in q) if MIN_NORM < norm < math.inf else (math.nan,) * 4
     return x, y, z, w
 
 

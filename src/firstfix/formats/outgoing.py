@@ -51,7 +51,10 @@ def header(make: Make, stamp: float, frame: str) -> Any:
     message
         The header.
     """
-    ns = max(0, round(stamp * _NS))
+    # The parts one by one: a product of 1e18 has lost 100 ns, and a stamp that is sent and heard
+    # would be another one.
+    whole = math.floor(stamp)
+    ns = max(0, whole * _NS + round((stamp - whole) * _NS))
     time = make("builtin_interfaces/Time", sec=ns // _NS, nanosec=ns % _NS)
     return make("std_msgs/Header", stamp=time, frame_id=frame)
 
