@@ -20,6 +20,7 @@ from firstfix.cli.doctor import doctor
 from firstfix.cli.locate import locate
 from firstfix.cli.map import map_app
 from firstfix.cli.nodes import PASSED_ON, ros1
+from firstfix.cli.serve import serve
 from firstfix.cli.track import track
 from firstfix.core.errors import FirstfixError
 
@@ -39,6 +40,7 @@ app.command()(track)
 app.command()(bench)
 app.add_typer(map_app, name="map")
 app.command()(demo)
+app.command()(serve)
 app.command(context_settings=PASSED_ON)(ros1)
 app.command()(doctor)
 

@@ -61,10 +61,14 @@ def greys(grid: OccupancyGrid, max_pixels: int) -> NDArray[np.uint8]:
     Where cells share a pixel the darkest is shown, so that thin walls stay: a wall before what
     nobody knows before what is free.
     """
+    return greys_of_blocks(grid, math.ceil(max(grid.cells.shape) / max_pixels))
+
+
+def greys_of_blocks(grid: OccupancyGrid, step: int) -> NDArray[np.uint8]:
+    """Return the map in grey as `greys` does, ``step`` x ``step`` cells to a pixel."""
     grey = np.full(grid.cells.shape, GREY_UNKNOWN, np.uint8)
     grey[grid.seen_free] = GREY_FREE
     grey[grid.occupied] = GREY_WALL
-    step = math.ceil(max(grey.shape) / max_pixels)
     if step == 1:
         return grey
     blocks = np.pad(grey, [(0, -grid.height % step), (0, -grid.width % step)], mode="edge")
