@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+import numpy as np
+
 from firstfix.core.odometry import Odometry
 from firstfix.formats.messages import StampedTransform
 from firstfix.formats.sensor_place import SensorPlace, place_of
 from firstfix.formats.tf_buffer import NotKnown, TransformBuffer
 from firstfix.formats.transforms import flat
 
-# Messages of one link may overtake each other by so much, s; more, and the clock was set back.
+# Messages may overtake each other by so much, s; more, and the clock was set back.
 _OVERTAKING_S = 1.0
 
 
@@ -27,10 +29,11 @@ class RobotFrames:
     def __init__(self, odom: str, base: str) -> None:
         self._odom = odom
         self._base = base
-        self._buffer = TransformBuffer()
-        self._newest: dict[str, float] = {}  # stamp of each frame that moves
+        self._tf = TransformBuffer()
+        # By itself: its frames need not agree with the tree of tf.
+        self._topic = TransformBuffer()
+        self._topic_child = base
         self._told_until = -math.inf
-        self._is_topic_used = False
 
     @property
     def told_until(self) -> float:
@@ -40,12 +43,18 @@ class RobotFrames:
     @property
     def reach(self) -> float | NotKnown:
         """Until when odometry is known, s; infinite for a robot that is fixed to its odometry."""
-        return self._buffer.newest(self._odom, self._base)
+        reach = math.inf
+        for buffer, target, source in self._way():
+            newest = buffer.newest(target, source)
+            if isinstance(newest, NotKnown):
+                return newest
+            reach = min(reach, newest)
+        return reach
 
     def fix(self, transforms: Iterable[StampedTransform]) -> None:
         """Take in transforms that hold for all times."""
         for transform in transforms:
-            self._buffer.add_static(transform)
+            self._tf.add_static(transform)
 
     def move(self, transforms: Iterable[StampedTransform]) -> float:
         """Take in transforms that move.
@@ -53,7 +62,7 @@ class RobotFrames:
         Parameters
         ----------
         transforms : iterable of StampedTransform
-            From ``tf``.
+            From ``tf``; only those between odometry and base tell the time.
 
         Returns
         -------
@@ -63,11 +72,10 @@ class RobotFrames:
         """
         back = 0.0
         for new in transforms:
-            if self._is_topic_used and new.child == self._base:
-                # Two sources must not be mixed, and tf is the one that was asked for.
-                self._is_topic_used = False
-                self._buffer.forget_moves()
-            back = max(back, self._add(new))
+            links = self._tf.links(self._odom, self._base)
+            if not isinstance(links, NotKnown) and new.child in links:
+                back = max(back, self._set_back(new.stamp))
+            self._tf.add(new)
         return back
 
     def move_by_topic(self, odometry: StampedTransform) -> float:
@@ -76,17 +84,19 @@ class RobotFrames:
         Parameters
         ----------
         odometry : StampedTransform
-            From `firstfix.formats.messages.to_odometry`.
+            From `firstfix.formats.messages.to_odometry`; without a child it is that of the base.
 
         Returns
         -------
         float
             As `move` does.
         """
-        if not self._is_topic_used and not isinstance(self.reach, NotKnown):
+        if not isinstance(self._tf.links(self._odom, self._base), NotKnown):
             return 0.0
-        self._is_topic_used = True
-        return self._add(odometry)
+        back = self._set_back(odometry.stamp)
+        self._topic_child = odometry.child or self._base
+        self._topic.add(odometry._replace(child=self._topic_child))
+        return back
 
     def news(self) -> list[Odometry]:
         """Return the odometry that has become known since the last call: one message or none."""
@@ -97,9 +107,12 @@ class RobotFrames:
 
     def odometry_at(self, stamp: float) -> list[Odometry]:
         """Return the odometry at a time, as told; none where it is not known."""
-        T_odom_base = self._buffer.at(self._odom, self._base, stamp)
-        if isinstance(T_odom_base, NotKnown):
-            return []
+        T_odom_base = np.eye(4)
+        for buffer, target, source in self._way():
+            T_target_source = buffer.at(target, source, stamp)
+            if isinstance(T_target_source, NotKnown):
+                return []
+            T_odom_base = T_odom_base @ T_target_source
         self._told_until = stamp
         return [Odometry(stamp, flat(T_odom_base))]
 
@@ -123,20 +136,25 @@ class RobotFrames:
         ScanError
             If it does not scan level.
         """
-        T_base_laser = self._buffer.at(self._base, frame, stamp)
+        T_base_laser = self._tf.at(self._base, frame, stamp)
         if isinstance(T_base_laser, NotKnown):
             return T_base_laser
         return place_of(frame, T_base_laser)
 
-    def _add(self, new: StampedTransform) -> float:
-        newest = self._newest.get(new.child, -math.inf)
-        back = newest - new.stamp
+    def _way(self) -> tuple[tuple[TransformBuffer, str, str], ...]:
+        """Return the steps from odometry to the base, with who knows them."""
+        by_tf = (self._tf, self._odom, self._base)
+        if not self._topic.frames or not isinstance(self._tf.links(*by_tf[1:]), NotKnown):
+            return (by_tf,)
+        child = self._topic_child
+        return (self._topic, self._odom, child), (self._tf, child, self._base)
+
+    def _set_back(self, stamp: float) -> float:
+        """Return by how much the clock was set back, s; if it was, forget what moved."""
+        back = self._told_until - stamp
         if back <= _OVERTAKING_S:
-            back = 0.0
-            self._newest[new.child] = max(newest, new.stamp)
-        else:
-            self._buffer.forget_moves()
-            self._newest = {new.child: new.stamp}
-            self._told_until = -math.inf
-        self._buffer.add(new)
+            return 0.0
+        self._tf.forget_moves()
+        self._topic.forget_moves()
+        self._told_until = -math.inf
         return back

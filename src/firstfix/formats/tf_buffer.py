@@ -15,6 +15,8 @@ from firstfix.formats.transforms import inverse, matrix
 
 KEPT_S = 10.0
 """How long moving transforms are remembered, s: as long as tf2 does."""
+FARTHEST_M = 1e9
+"""Nothing on a robot is farther from its parent; products of such numbers stay finite."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +71,7 @@ class TransformBuffer:
         Parameters
         ----------
         transform : StampedTransform
-            One whose numbers are not finite is left out.
+            One whose numbers are not finite, or beyond `FARTHEST_M`, is left out.
         """
         self._add(transform, fixed=False)
 
@@ -99,11 +101,27 @@ class TransformBuffer:
         float or NotKnown
             s; infinite if all links are fixed.
         """
-        ways = self._ways(target, source)
-        if isinstance(ways, NotKnown):
-            return ways
-        edges = [self._edges[frame] for way in ways for frame in way]
+        links = self.links(target, source)
+        if isinstance(links, NotKnown):
+            return links
+        edges = [self._edges[frame] for frame in links]
         return min((e.moves[-1].stamp for e in edges if not e.fixed), default=math.inf)
+
+    def links(self, target: str, source: str) -> tuple[str, ...] | NotKnown:
+        """Find the links between two frames.
+
+        Parameters
+        ----------
+        target, source : str
+            Frames.
+
+        Returns
+        -------
+        tuple of str or NotKnown
+            The child of each.
+        """
+        ways = self._ways(target, source)
+        return ways if isinstance(ways, NotKnown) else (*ways[0], *ways[1])
 
     def at(self, target: str, source: str, stamp: float) -> NDArray[np.float64] | NotKnown:
         """Chain transforms at a time, interpolated where they move.
@@ -136,7 +154,8 @@ class TransformBuffer:
         return inverse(T_top_target) @ T_top_source
 
     def _add(self, new: StampedTransform, *, fixed: bool) -> None:
-        if not all(map(math.isfinite, (new.stamp, *new.translation, *new.rotation))):
+        is_finite = all(map(math.isfinite, (new.stamp, *new.rotation)))
+        if not (is_finite and all(abs(v) <= FARTHEST_M for v in new.translation)):
             return
         edge = self._edges.get(new.child)
         if edge is None or edge.parent != new.parent or edge.fixed != fixed:
