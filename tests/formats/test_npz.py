@@ -1,6 +1,7 @@
 """Recordings in .npz files."""
 
 import io
+import math
 import struct
 import time
 import zipfile
@@ -20,7 +21,7 @@ from firstfix.core.recording import Recording
 from firstfix.core.scan import LaserScan, Mounting
 from firstfix.core.se2 import SE2
 from firstfix.core.trajectory import Trajectory
-from firstfix.formats.npz import load_npz, save_npz
+from firstfix.formats.npz import load_npz, read_scan, save_npz
 
 Write = Callable[..., Path]
 
@@ -290,3 +291,40 @@ def test_every_case_loads(shared: Path) -> None:
         assert recording.truth is not None
         assert np.isfinite(recording.truth).all()
         assert np.mean([scan.hit.mean() for scan in recording.scans]) > 0.2
+
+
+def packed(**arrays) -> io.BytesIO:
+    file = io.BytesIO()
+    np.savez_compressed(file, **{**SENT, **arrays})
+    file.seek(0)
+    return file
+
+
+SENT = {
+    "ranges": np.array([1.0, 2.0, np.inf], np.float32),
+    "angle_min": -1.0,
+    "angle_increment": 0.5,
+    "range_min": 0.1,
+    "range_max": 8.0,
+}
+
+
+def test_a_scan_that_was_sent_is_read_with_its_place():
+    scan = read_scan(packed(T_base_laser=[0.1, 0.2, 0.3]), 10_000)
+    assert scan.ranges.tolist() == [1.0, 2.0, math.inf]
+    assert scan.T_base_laser == SE2(0.1, 0.2, 0.3)
+
+
+@pytest.mark.parametrize(
+    "arrays",
+    [
+        {"ranges": np.ones((2, 3))},
+        {"ranges": np.empty((0, 3))},
+        {"ranges": np.zeros(1_000_000)},  # packs to a thousandth
+        {"ranges": np.array([None], object)},
+        {"range_max": -1.0},
+    ],
+)
+def test_what_is_not_one_scan_or_unpacks_to_too_much_is_refused(arrays):
+    with pytest.raises(ScanError, match=r"what was sent|one by one|split"):
+        read_scan(packed(**arrays), 10_000)

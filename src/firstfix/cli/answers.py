@@ -1,11 +1,9 @@
-"""Answers for people and for programs."""
+"""Answers for people."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
@@ -17,44 +15,6 @@ from firstfix.evaluation.tables import markdown_table
 # What is listed for a person: places that are likely at all, and some to compare them with.
 LEAST_PROBABILITY = 0.001
 FEWEST_ROWS, MOST_ROWS = 3, 10
-
-
-def as_json(index: int, result: LocateResult, truth: SE2 | None) -> dict[str, Any]:
-    """Put an answer into the document that ``locate --json`` writes, one a line.
-
-    Parameters
-    ----------
-    index : int
-        Of the scan.
-    result : LocateResult
-        The answer.
-    truth : SE2 or None
-        ``T_map_base`` where the log knows it.
-
-    Returns
-    -------
-    dict
-        ``index``, ``verdict``, ``reason``, ``pose`` [x (m), y (m), yaw (rad)] and ``covariance``
-        of the best hypothesis whatever the verdict (null if there is none), ``hypotheses``,
-        ``search``, ``elapsed_s``, ``error`` {"m", "deg"} (null without truth). No NaN, no infinity.
-    """
-    best = result.best
-    error = None
-    if best is not None and truth is not None:
-        off = PoseError.between(best.pose, truth)
-        error = {"m": off.metres, "deg": math.degrees(off.radians)}
-    document = {
-        "index": index,
-        "verdict": result.verdict.value,
-        "reason": result.reason,
-        "pose": None if best is None else best.pose.as_array().tolist(),
-        "covariance": None if best is None else best.covariance.tolist(),
-        "hypotheses": [_hypothesis(hypothesis) for hypothesis in result.hypotheses],
-        "search": asdict(result.search),
-        "elapsed_s": result.elapsed_s,
-        "error": error,
-    }
-    return {key: _finite(value) for key, value in document.items()}
 
 
 def as_text(result: LocateResult, truth: SE2 | None) -> str:
@@ -95,16 +55,6 @@ def error_text(pose: SE2, truth: SE2) -> str:
     return f"{error.metres:.3f} m, {math.degrees(error.radians):.2f}°"
 
 
-def _hypothesis(hypothesis: Hypothesis) -> dict[str, Any]:
-    return {
-        "pose": hypothesis.pose.as_array().tolist(),
-        "covariance": hypothesis.covariance.tolist(),
-        "score": hypothesis.score,
-        "probability": hypothesis.probability,
-        "evidence": asdict(hypothesis.evidence),
-    }
-
-
 def _evidence_text(hypothesis: Hypothesis) -> str:
     e = hypothesis.evidence
     return (
@@ -136,12 +86,3 @@ def _hypothesis_table(hypotheses: Sequence[Hypothesis]) -> str:
             for rank, h in enumerate(hypotheses, 1)
         ],
     )
-
-
-def _finite(value: Any) -> Any:
-    """Replace what JSON cannot say, at any depth, by null."""
-    if isinstance(value, dict):
-        return {key: _finite(inner) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [_finite(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -42,8 +42,9 @@ def locate(
     One scan (not --all) ends with exit status 0 if its place is UNIQUE and 1 if it is not.
     """
     _check_options(index, every, plot)
-    from firstfix.cli.answers import as_json, as_text
+    from firstfix.cli.answers import as_text
     from firstfix.core.estimate import Verdict
+    from firstfix.evaluation.answer import answer_document
     from firstfix.evaluation.case import truth_at
     from firstfix.formats.map_server import load_map
     from firstfix.formats.recording import load_recording
@@ -67,7 +68,7 @@ def locate(
             truth = truth_at(recording, i)
             result = locator.locate(recording.scans[i])
             if as_lines:
-                typer.echo(json.dumps(as_json(i, result, truth), allow_nan=False))
+                typer.echo(json.dumps(answer_document(i, result, truth), allow_nan=False))
             else:
                 typer.echo(f"{f'scan {i}: ' if every else ''}{as_text(result, truth)}")
             done(result.verdict.value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from firstfix.formats.poses import chain
 from firstfix.formats.scan_errors import check_max_scans, located, too_many_scans
 from firstfix.formats.stamps import ascending, sorting_notes
 
-__all__ = ["MAX_JITTER", "load_npz", "save_npz"]
+__all__ = ["MAX_JITTER", "load_npz", "read_scan", "save_npz"]
 
 # Loggers write messages in the order of their arrival. A longer step back, s, means that a clock
 # was set or logs were joined, and sorting would shuffle two drives.
@@ -76,6 +77,38 @@ def load_npz(path: str | Path, *, max_scans: int | None = None) -> Recording:
             runs=None if runs is None else runs[order],
             notes=sorting_notes(order),
         )
+
+
+def read_scan(file: IO[bytes], max_bytes: int) -> LaserScan:
+    """Read the only scan of an .npz file that somebody has sent.
+
+    Parameters
+    ----------
+    file : binary file
+        With the arrays of `load_npz`; those that are not about the scan are passed over.
+    max_bytes : int
+        What its arrays may unpack to together.
+
+    Returns
+    -------
+    LaserScan
+        With its place on the robot.
+
+    Raises
+    ------
+    ScanError
+        If an array is missing, damaged or too large, or there is not one scan.
+    """
+    with NpzArchive(file, max_bytes) as archive, located("what was sent"):
+        ranges = _ranges(archive)
+        if len(ranges) != 1:
+            raise ScanError(
+                expected="one scan",
+                received=f"{len(ranges)} scans",
+                remedy="send them one by one",
+            )
+        (scan,) = _scans(archive, ranges, np.zeros(1), _mounted_at(archive))
+        return scan
 
 
 def _ranges(archive: NpzArchive) -> NDArray[np.generic]:

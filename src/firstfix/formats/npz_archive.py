@@ -46,8 +46,10 @@ class NpzArchive:
 
     Parameters
     ----------
-    path : Path
+    file : Path or binary file
         The .npz file.
+    max_bytes : int
+        What its arrays may unpack to together.
 
     Raises
     ------
@@ -55,11 +57,11 @@ class NpzArchive:
         If it is not an archive, or an array is damaged, not numeric, or too large.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._left = MAX_BYTES
+    def __init__(self, file: Path | IO[bytes], max_bytes: int = MAX_BYTES) -> None:
+        self._name = f"{file}" if isinstance(file, Path) else "what was sent"
+        self._max_bytes = self._left = max_bytes
         with self._damage_told():
-            self._zip = zipfile.ZipFile(path)
+            self._zip = zipfile.ZipFile(file)
 
     def __enter__(self) -> NpzArchive:
         return self
@@ -91,7 +93,7 @@ class NpzArchive:
         if name not in self:
             raise ScanError(
                 expected=f"the array `{name}`",
-                received=f"none in {self._path}",
+                received=f"none in {self._name}",
                 remedy="save ranges, angle_min, angle_increment, range_min and range_max",
             )
         with self._damage_told(), self._zip.open(f"{name}.npy") as stream:
@@ -106,7 +108,7 @@ class NpzArchive:
         if array.size != 1:
             raise ScanError(
                 expected=f"one number `{name}` for the whole sensor",
-                received=f"shape {array.shape} in {self._path}",
+                received=f"shape {array.shape} in {self._name}",
                 remedy="save the scans of different sensors in files of their own",
             )
         return float(_as_float64(array).item())
@@ -132,7 +134,7 @@ class NpzArchive:
         if array.shape != shape:
             raise ScanError(
                 expected=f"`{name}` of shape {shape}",
-                received=f"shape {array.shape} in {self._path}",
+                received=f"shape {array.shape} in {self._name}",
                 remedy="give one row for every scan",
             )
         return _as_float64(array)
@@ -142,7 +144,7 @@ class NpzArchive:
         if dtype.kind not in "biuf":
             raise ScanError(
                 expected=f"numbers in the array `{name}`",
-                received=f"{dtype} in {self._path}",
+                received=f"{dtype} in {self._name}",
                 remedy="save plain float or integer arrays",
             )
         # The promise of the header, and what the archive holds: each alone can be a lie.
@@ -151,14 +153,14 @@ class NpzArchive:
         if min(shape, default=0) < 0 or not 0 <= size <= packed:
             raise ScanError(
                 expected=f"{size} bytes in the array `{name}`, as its header says",
-                received=f"{packed} in {self._path}",
+                received=f"{packed} in {self._name}",
                 remedy="save the archive again",
             )
         self._left -= size
         if self._left < 0:
             raise ScanError(
-                expected=f"arrays of at most {MAX_BYTES} bytes in total",
-                received=f"more with `{name}` of shape {shape} in {self._path}",
+                expected=f"arrays of at most {self._max_bytes} bytes in total",
+                received=f"more with `{name}` of shape {shape} in {self._name}",
                 remedy="split the recording",
             )
 
@@ -167,7 +169,7 @@ class NpzArchive:
         try:
             yield
         except _DAMAGE as error:
-            raise unreadable(self._path, "an .npz archive", error) from error
+            raise unreadable(self._name, "an .npz archive", error) from error
 
 
 def _as_float64(array: NDArray[np.generic]) -> NDArray[np.float64]:

@@ -39,13 +39,13 @@ def located(where: str) -> Iterator[None]:
         ) from error
 
 
-def unreadable(path: Path, kind: str, error: BaseException) -> ScanError:
+def unreadable(path: Path | str, kind: str, error: BaseException) -> ScanError:
     """Turn what a library found wrong with a file into one sentence.
 
     Parameters
     ----------
-    path : Path
-        The file.
+    path : Path or str
+        The file, or another name for it.
     kind : str
         What it should have been, such as ``"an .npz archive"``.
     error : BaseException
