@@ -56,7 +56,7 @@ class Node:
         self._transport = transport
         self._watchers = watchers
         self._inbox: Inbox[tuple[Heard, Any]] = Inbox()
-        self._intake = Intake(config.amcl, self._complain)
+        self._intake = Intake(config.amcl, self.complain)
         self._announcer = Announcer(config, transport)
         self._localizer = Localizer(LocalizerConfig(amcl=config.amcl), cache_folder())
         self._said_at: dict[str, float] = {}
@@ -106,6 +106,21 @@ class Node:
         """
         self.hear(Heard.INPUT, given)
 
+    def complain(self, subject: str, text: str) -> None:
+        """Write a warning, unless there was one on this subject a moment ago.
+
+        Parameters
+        ----------
+        subject : str
+            What it is about.
+        text : str
+            For people.
+        """
+        now = time.monotonic()
+        if now - self._said_at.get(subject, -_REPEAT_S) >= _REPEAT_S:
+            self._said_at[subject] = now
+            self._transport.log(Gravity.WARNING, text)
+
     def _work(self) -> None:
         self._try(self._make_ready)
         self._looked_at = time.monotonic()
@@ -138,15 +153,9 @@ class Node:
         try:
             step(*given)
         except InputError as error:
-            self._complain(str(error)[:40], f"{error}")
+            self.complain(str(error)[:40], f"{error}")
         except Exception:  # noqa: BLE001 - a node that died silently would be worse
-            self._complain("error", f"an error of firstfix itself:\n{traceback.format_exc()}")
-
-    def _complain(self, subject: str, text: str) -> None:
-        now = time.monotonic()
-        if now - self._said_at.get(subject, -_REPEAT_S) >= _REPEAT_S:
-            self._said_at[subject] = now
-            self._transport.log(Gravity.WARNING, text)
+            self.complain("error", f"an error of firstfix itself:\n{traceback.format_exc()}")
 
     def _say_what_is_missing(self) -> None:
         """Name the topics that were silent since the last look; whether others spoke or not."""
@@ -156,6 +165,6 @@ class Node:
             if heard in topics and heard not in self._heard:
                 topic = topics[heard]
                 text = f"nothing heard on {topic.name} ({topic.type_name}) for {_LOOK_S:.0f} s"
-                self._complain(heard.value, text)
+                self.complain(heard.value, text)
         # A map is told once; what is wrong with odometry, every scan tells.
         self._heard &= {Heard.MAP}

@@ -1,0 +1,109 @@
+"""Which network of ROS 2 to take part in, by the environment variables of ROS."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from xml.sax.saxutils import quoteattr
+
+from firstfix.core.errors import InputError
+
+_LAST_DOMAIN = 232  # beyond it there are no ports
+_RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
+# So many processes of one machine find each other without multicast; rmw_cyclonedds' number.
+_PROCESSES = 32
+# ROS 2 tells messages apart by their names. Fast DDS (1.15), for one, describes its types
+# otherwise than Cyclone DDS (1.16) does, and where descriptions differ nothing would be heard.
+_NAMES_COUNT = (
+    "<Compatibility><IgnoreTypeInformation>1.1,1.15,1.16</IgnoreTypeInformation></Compatibility>"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class DomainSettings:
+    """A domain of DDS.
+
+    Parameters
+    ----------
+    number : int
+        ``ROS_DOMAIN_ID``.
+    configuration : str
+        Of Cyclone DDS: fragments of XML, or files, with commas between them; the last one counts.
+    """
+
+    number: int
+    configuration: str
+
+
+def domain_settings(environment: Mapping[str, str] = os.environ) -> DomainSettings:
+    """Read the variables of ROS, and CYCLONEDDS_URI, which has the last word.
+
+    Parameters
+    ----------
+    environment : mapping of str to str
+        Of the process.
+
+    Returns
+    -------
+    DomainSettings
+        What rmw_cyclonedds would make of them.
+
+    Raises
+    ------
+    InputError
+        If a variable has a value that it cannot have.
+    """
+    own = f"<CycloneDDS><Domain>{_NAMES_COUNT}{_discovery(environment)}</Domain></CycloneDDS>"
+    configuration = ",".join(filter(None, (own, environment.get("CYCLONEDDS_URI", ""))))
+    if not configuration.isascii():
+        raise InputError(
+            expected="CYCLONEDDS_URI and ROS_STATIC_PEERS in ASCII",
+            received=f"{configuration!a:.60}",
+            remedy="move the file to a folder with a plain name",
+        )
+    return DomainSettings(_number(environment.get("ROS_DOMAIN_ID") or "0"), configuration)
+
+
+def _number(text: str) -> int:
+    number = int(text) if text.isascii() and text.isdigit() and len(text) < 5 else -1
+    if not 0 <= number <= _LAST_DOMAIN:
+        raise InputError(
+            expected=f"ROS_DOMAIN_ID from 0 to {_LAST_DOMAIN}",
+            received=f"{text!r:.60}",
+            remedy="set it as on the robot",
+        )
+    return number
+
+
+def _discovery(environment: Mapping[str, str]) -> str:
+    """Say whom to look for."""
+    is_local = environment.get("ROS_LOCALHOST_ONLY") == "1"
+    default = "LOCALHOST" if is_local else "SUBNET"
+    reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") or default
+    if is_local:  # ROS lets the older variable count where both are set
+        reach = "LOCALHOST"
+    if reach not in _RANGES:
+        raise InputError(
+            expected=f"ROS_AUTOMATIC_DISCOVERY_RANGE as one of {', '.join(_RANGES)}",
+            received=f"{reach!r:.60}",
+            remedy="unset it to find the robots of the local network",
+        )
+    if reach == "OFF":
+        # With a tag of its own, a participant is found by nobody.
+        alone = f"<ParticipantIndex>none</ParticipantIndex><Tag>firstfix_{os.getpid()}</Tag>"
+        return f"{_NO_MULTICAST}<Discovery>{alone}</Discovery>"
+    text = "" if is_local or reach == "SYSTEM_DEFAULT" else environment.get("ROS_STATIC_PEERS", "")
+    peers = [peer.strip() for peer in text.split(";") if peer.strip()]
+    if reach == "LOCALHOST":
+        peers.insert(0, "localhost")
+    if not peers:
+        return ""
+    listed = "".join(f"<Peer address={quoteattr(peer)}/>" for peer in peers)
+    index = f"<MaxAutoParticipantIndex>{_PROCESSES}</MaxAutoParticipantIndex>"
+    index = f"<ParticipantIndex>auto</ParticipantIndex>{index}"
+    found = f"<Discovery>{index}<Peers>{listed}</Peers></Discovery>"
+    return (_NO_MULTICAST if reach == "LOCALHOST" else "") + found
+
+
+_NO_MULTICAST = "<General><AllowMulticast>false</AllowMulticast></General>"

@@ -1,0 +1,171 @@
+"""A network of DDS on the loopback interface: a node as users start it, robots, and ears."""
+
+from __future__ import annotations
+
+import importlib.util
+import itertools
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+ROBOT = Path(__file__).with_name("dds_robot.py")
+# Nothing leaves this machine.
+LOOPBACK = (
+    "<General><Interfaces><NetworkInterface name='lo'/></Interfaces>"
+    "<AllowMulticast>false</AllowMulticast></General>"
+    "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
+    "<Peers><Peer address='127.0.0.1'/></Peers></Discovery>"
+)
+# A busy machine is not a bug: generous, since nobody waits so long when all is well.
+PATIENCE_S = 90.0
+
+_counter = itertools.count(os.getpid() * 7)
+Found = TypeVar("Found")
+
+
+def why_missing() -> str:
+    """Say why there can be no lab; empty if there can."""
+    is_there = importlib.util.find_spec("cyclonedds") is not None
+    return "" if is_there else "no cyclonedds: pip install 'firstfix[dds]'"
+
+
+def free_domain() -> int:
+    """Return the number of a domain in which nobody is."""
+    while True:
+        domain = 1 + next(_counter) % 100
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(("127.0.0.1", 7400 + 250 * domain + 10))
+            except OSError:
+                continue
+            return domain
+
+
+class Program:
+    """A process with its log."""
+
+    def __init__(self, arguments: list[str], log: Path, environment: dict[str, str]) -> None:
+        self._log = log
+        with log.open("wb") as out:
+            self.process = subprocess.Popen(
+                arguments, stdout=out, stderr=out, stdin=subprocess.DEVNULL, env=environment
+            )
+
+    @property
+    def log(self) -> str:
+        """What it has said so far."""
+        return self._log.read_text(encoding="utf-8")
+
+    def end(self, how: int = signal.SIGTERM) -> int:
+        """End it and return its exit status."""
+        if self.process.poll() is None:
+            self.process.send_signal(how)
+        try:
+            return self.process.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise
+
+
+class Lab:
+    """One domain, and what runs in it."""
+
+    def __init__(self, folder: Path) -> None:
+        from cyclonedds.domain import Domain, DomainParticipant
+
+        self.folder = folder
+        self.domain = free_domain()
+        kept = {k: v for k, v in os.environ.items() if not k.startswith(("ROS_", "CYCLONEDDS"))}
+        self.environment = kept | {"CYCLONEDDS_URI": LOOPBACK, "ROS_DOMAIN_ID": str(self.domain)}
+        self._programs: list[Program] = []
+        # Types that are not what they claim to be must not keep these ears shut.
+        ignore = (
+            "<Compatibility><IgnoreTypeInformation>1.16</IgnoreTypeInformation></Compatibility>"
+        )
+        self._domain = Domain(self.domain, LOOPBACK + ignore)
+        self.participant = DomainParticipant(self.domain)
+
+    def node(self, *arguments: str, **environment: str) -> Program:
+        """Start a node."""
+        return self._start([sys.executable, "-m", "firstfix", "dds", *arguments], environment)
+
+    def robot(self, script: str, *arguments: str, **environment: str) -> Program:
+        """Start a robot."""
+        program = [sys.executable, str(ROBOT), script, str(self.truth_file), *arguments]
+        return self._start(program, environment)
+
+    def ear(self, topic: str, kind: str, *policies: Any) -> Ear:
+        """Listen to a topic of ROS."""
+        return Ear(self.participant, f"rt{topic}", kind, *policies)
+
+    def end(self) -> None:
+        """End all that still runs."""
+        for program in self._programs:
+            program.process.kill()
+            program.process.wait()
+
+    @property
+    def truth_file(self) -> Path:
+        """Where the robot writes its true poses."""
+        return self.folder / "truth.jsonl"
+
+    def truth(self) -> np.ndarray:
+        """Return the true poses of the robot so far: stamp, x, y, yaw."""
+        lines = self.truth_file.read_text(encoding="utf-8").splitlines()
+        return np.array([json.loads(line) for line in lines if line.endswith("]")])
+
+    def _start(self, arguments: list[str], environment: dict[str, str]) -> Program:
+        log = self.folder / f"{len(self._programs)}.log"
+        self._programs.append(Program(arguments, log, self.environment | environment))
+        return self._programs[-1]
+
+
+class Ear:
+    """A reader of one topic, with all that it has heard."""
+
+    def __init__(self, participant: Any, name: str, kind: str, *policies: Any) -> None:
+        from cyclonedds.qos import Policy, Qos
+        from cyclonedds.sub import DataReader
+        from cyclonedds.topic import Topic
+
+        from firstfix.adapters.dds_types import Cdr, decode, described
+
+        self._decode = lambda data: decode(kind, data)
+        topic = Topic(participant, name, described(kind))
+        topic.data_type = Cdr
+        xcdr1 = Policy.DataRepresentation(use_cdrv0_representation=True)
+        self.reader = DataReader(participant, topic, Qos(xcdr1, Policy.History.KeepAll, *policies))
+        self._heard: list[Any] = []
+
+    @property
+    def heard(self) -> list[Any]:
+        """All messages so far."""
+        samples = self.reader.take(10_000)
+        self._heard += [self._decode(s.data) for s in samples if s.sample_info.valid_data]
+        return self._heard
+
+
+def wait_for(find: Callable[[], Found], patience_s: float = PATIENCE_S) -> Found:
+    """Wait until something is found, and return it."""
+    deadline = time.monotonic() + patience_s
+    while not (found := find()):
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.05)
+    return found
+
+
+def pose_of(message: Any) -> tuple[float, float, float]:
+    """Return x, y, yaw of a PoseWithCovarianceStamped."""
+    from firstfix.formats.messages import to_planar, to_pose
+
+    where = to_planar(to_pose(message))
+    return where.x, where.y, where.yaw
