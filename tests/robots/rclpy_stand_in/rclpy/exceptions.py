@@ -1,0 +1,17 @@
+"""What parameters can be wrong with."""
+
+
+class ParameterException(Exception):
+    """Of all of them."""
+
+
+class ParameterAlreadyDeclaredException(ParameterException):
+    """Declared twice."""
+
+
+class InvalidParameterTypeException(ParameterException):
+    """Of another type than its default."""
+
+
+class InvalidParameterValueException(ParameterException):
+    """Out of range."""

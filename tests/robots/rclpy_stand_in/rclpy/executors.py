@@ -1,0 +1,5 @@
+"""How `spin` ends."""
+
+
+class ExternalShutdownException(Exception):
+    """ROS has ended."""

@@ -1,0 +1,112 @@
+"""A robot and its friends around a node of ROS 2, over the stand-in for rclpy."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.se2 import SE2
+from firstfix.formats.outgoing import laser_scan, occupancy_grid, transforms
+from firstfix.sim.lidar import Lidar
+
+STAND_IN = Path(__file__).parent / "rclpy_stand_in"
+ALL = ("nav2_msgs", "kobuki_ros_interfaces")
+# The wheels never turn: whoever changes the pose of the robot carries it.
+T_ODOM_BASE = SE2(5.0, 5.0, 1.0)
+# A kernel may have to be compiled first.
+PATIENCE_S = 120.0
+
+
+class Lab:
+    """A fresh rclpy with what is installed beside it; the node is loaded anew over it."""
+
+    def __init__(self, patch: pytest.MonkeyPatch, optional: tuple[str, ...] = ALL) -> None:
+        patch.syspath_prepend(str(STAND_IN))
+        ros_types = importlib.import_module("ros_types")
+        ours = [n for n in sys.modules if n.startswith(("rclpy", "firstfix.adapters.ros2"))]
+        for name in [*ours, *ros_types.names()]:
+            patch.delitem(sys.modules, name, raising=False)
+        for name, module in ros_types.modules(optional).items():
+            patch.setitem(sys.modules, name, module)
+        self.rclpy = importlib.import_module("rclpy")
+        self.world = importlib.import_module("rclpy.graph").world
+        self.lifecycle = importlib.import_module("rclpy.lifecycle")
+        self.types = importlib.import_module("firstfix.adapters.ros2_types")
+        self.ros2 = importlib.import_module("firstfix.adapters.ros2")
+        self.nodes: list[Any] = []
+
+    def node(self, *arguments: str) -> Any:
+        """Start a node as a command line with these arguments of ROS does."""
+        self.rclpy.init(args=["firstfix", "--ros-args", *arguments])
+        self.nodes.append(self.ros2.Ros2Node())
+        return self.nodes[-1]
+
+    def quality(self, *, is_sensor: bool = False, is_latched: bool = False, depth: int = 10) -> Any:
+        """Return a quality of service."""
+        qos = importlib.import_module("rclpy.qos")
+        reliable, kept = qos.ReliabilityPolicy, qos.DurabilityPolicy
+        return qos.QoSProfile(
+            depth=depth,
+            reliability=reliable.BEST_EFFORT if is_sensor else reliable.RELIABLE,
+            durability=kept.TRANSIENT_LOCAL if is_latched else kept.VOLATILE,
+        )
+
+    def hears(self, topic: str, type_name: str, **quality: Any) -> list[Any]:
+        """Return a list that grows with what is published."""
+        return self.world.hears(self.types.find("msg", type_name), topic, self.quality(**quality))
+
+    def says(self, topic: str, type_name: str, **quality: Any) -> Any:
+        """Return a publisher."""
+        return self.world.says(self.types.find("msg", type_name), topic, self.quality(**quality))
+
+    def end(self) -> None:
+        """Let no thread outlive its test."""
+        for node in self.nodes:
+            node.end()
+
+
+class Robot:
+    """A robot that stands in a map, and its map server."""
+
+    def __init__(self, lab: Lab, grid: OccupancyGrid, T_map_base: SE2) -> None:
+        self.lab, self.grid, self.T_map_base = lab, grid, T_map_base
+        self.make = lab.types.make
+        self.lidar = Lidar(beams=180, T_base_laser=SE2(0.1, 0.0, 0.0))
+        self.stamp = 100.0
+        self.scan = lab.says("scan", "sensor_msgs/LaserScan", is_sensor=True, depth=5)
+        self.tf = lab.says("/tf", "tf2_msgs/TFMessage", depth=100)
+        self.fixed = lab.says("/tf_static", "tf2_msgs/TFMessage", is_latched=True, depth=1)
+        self.map = lab.says("map", "nav_msgs/OccupancyGrid", is_latched=True, depth=1)
+        T_base_laser = self.lidar.T_base_laser
+        self.fixed.publish(transforms(self.make, 0.0, "base_footprint", "laser", T_base_laser))
+        self.map.publish(occupancy_grid(self.make, 0.0, "map", grid))
+
+    def look(self) -> None:
+        """Report odometry and a scan, a tenth of a second later."""
+        self.stamp += 0.1
+        wheels = transforms(self.make, self.stamp, "odom", "base_footprint", T_ODOM_BASE)
+        self.tf.publish(wheels)
+        rng = np.random.default_rng(round(10 * self.stamp))
+        seen = replace(self.lidar.scan(self.grid, self.T_map_base, rng), stamp=self.stamp)
+        self.scan.publish(laser_scan(self.make, "laser", seen))
+
+    def look_until(self, is_done: Callable[[], Any]) -> None:
+        """Look again and again, as slowly as the node thinks, until something has happened."""
+        wait_until(lambda: (self.look(), is_done())[1])
+
+
+def wait_until(is_done: Callable[[], Any]) -> None:
+    """Wait until something has happened."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not is_done():
+        assert time.monotonic() < deadline, "it did not happen"
+        time.sleep(0.02)
