@@ -1,0 +1,154 @@
+/** What a person may do to the robot, and the mode that the next press on the map is in. */
+
+const MODES = {
+  pose: {
+    text: "Press where the robot stands, pull towards where it looks.",
+    keys: "Arrows move, Shift + ← → turn, Enter sets.",
+  },
+  goal: { text: "Press where the robot shall drive.", keys: "Arrows move, Enter sends." },
+  carry: {
+    text: "Press where the robot is put down, pull towards where it will look.",
+    keys: "Arrows move, Shift + ← → turn, Enter drops.",
+  },
+};
+
+const byId = (id) => document.getElementById(id);
+
+export class Actions {
+  #abilities = new Set();
+  #maySteer = false;
+
+  /**
+   * @param {Connection} connection
+   * @param {Scene} scene
+   * @param {View} view
+   * @param {Notices} notices
+   * @param {() => void} onChange the map must be drawn anew
+   */
+  constructor(connection, scene, view, notices, onChange) {
+    Object.assign(this, { connection, scene, view, notices, onChange });
+    for (const mode of Object.keys(MODES)) {
+      byId(`mode-${mode}`).addEventListener("click", () => this.toggleMode(mode));
+    }
+    byId("leave-mode").addEventListener("click", () => this.leaveMode());
+    byId("relocalize").addEventListener("click", () => this.relocalize());
+    byId("pause").addEventListener("click", () => this.togglePause());
+    byId("people").addEventListener("input", () => this.#setPeople());
+    byId("add-person").addEventListener("click", () => {
+      byId("people").stepUp();
+      this.#setPeople();
+    });
+  }
+
+  /** What this viewer may do, as `hello` says. */
+  allow(maySteer, abilities) {
+    this.#maySteer = maySteer;
+    this.#abilities = new Set(maySteer ? ["pose", ...abilities] : []);
+    byId("tools").hidden = !maySteer;
+    byId("watching").hidden = maySteer;
+    byId("mode-goal").hidden = !this.#abilities.has("goal");
+    byId("mode-carry").hidden = !this.#abilities.has("carry");
+    byId("pause").hidden = !this.#abilities.has("pause");
+    byId("simulation").hidden = !this.#abilities.has("people");
+    for (const line of document.querySelectorAll("#help-dialog .steer")) {
+      const asks = ["goal", "carry", "pause"].filter((ability) => line.classList.contains(ability));
+      line.hidden = !maySteer || !asks.every((ability) => this.#abilities.has(ability));
+    }
+    if (!this.#abilities.has(this.scene.mode)) this.leaveMode();
+  }
+
+  get maySteer() {
+    return this.#maySteer;
+  }
+
+  toggleMode(mode) {
+    if (this.scene.mode === mode) this.leaveMode();
+    else if (this.#abilities.has(mode)) this.#enter(mode);
+  }
+
+  /** By keys a draft must stand somewhere before it can be moved. */
+  toggleModeByKey(mode) {
+    this.toggleMode(mode);
+    if (this.scene.mode === mode) this.#beginDraft();
+  }
+
+  /** By a long press; false for those who may only watch. */
+  enterPoseMode() {
+    if (this.#maySteer && this.scene.mode !== "pose") this.#enter("pose");
+    return this.#maySteer;
+  }
+
+  leaveMode() {
+    this.#enter("look");
+  }
+
+  #beginDraft() {
+    const { scene, view } = this;
+    const [x, y] = view.toMap(...view.middle);
+    const believed = scene.state?.pose;
+    const [atX, atY, yaw] = scene.mode === "carry" ? [x, y, 0] : (believed ?? [x, y, 0]);
+    scene.draft = { kind: scene.mode, x: atX, y: atY, yaw };
+    this.onChange();
+  }
+
+  #enter(mode) {
+    const { scene } = this;
+    scene.mode = mode;
+    scene.draft = null;
+    byId("app").dataset.mode = mode;
+    for (const name of Object.keys(MODES)) {
+      byId(`mode-${name}`).setAttribute("aria-pressed", String(name === mode));
+    }
+    this.notices.showMode(MODES[mode] ?? null);
+    this.onChange();
+  }
+
+  /** Send what was drawn. */
+  set() {
+    const { scene } = this;
+    const draft = scene.draft;
+    scene.draft = null;
+    if (!draft) return;
+    const { kind, x, y, yaw } = draft;
+    const wrapped = Math.atan2(Math.sin(yaw), Math.cos(yaw));
+    if (kind === "goal") {
+      if (this.#send({ type: "goal", x, y })) scene.goal = [x, y];
+    } else {
+      scene.goal = null;
+      this.#send({ type: kind, x, y, yaw: wrapped });
+      this.leaveMode();
+    }
+    this.onChange();
+  }
+
+  pick(index) {
+    if (!this.#maySteer) return;
+    this.#send({ type: "pick", index });
+    this.leaveMode();
+  }
+
+  relocalize() {
+    if (this.#maySteer) this.#send({ type: "relocalize" });
+  }
+
+  togglePause() {
+    if (!this.#abilities.has("pause")) return;
+    this.#send({ type: "pause", paused: !this.scene.state?.paused });
+  }
+
+  needsPull() {
+    this.notices.complain("Press, then pull in the direction in which the robot looks.");
+  }
+
+  #setPeople() {
+    const count = Number(byId("people").value);
+    byId("people-count").value = count;
+    this.#send({ type: "people", count });
+  }
+
+  #send(message) {
+    const sent = this.connection.send(message);
+    if (!sent) this.notices.complain("Not connected: nothing was sent.");
+    return sent;
+  }
+}

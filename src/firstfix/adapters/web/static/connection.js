@@ -1,0 +1,83 @@
+/** The WebSocket to the robot: comes back by itself, and asks for a token where one is needed. */
+
+import { readFrame } from "./frames.js";
+import { authorization, token } from "./token.js";
+
+const FIRST_WAIT_MS = 400;
+const LONGEST_WAIT_MS = 8000;
+const NO_TOKEN = 4401; // close code: the token is missing or wrong
+
+export class Connection {
+  #socket = null;
+  #wait = FIRST_WAIT_MS;
+  #timer = 0;
+
+  /**
+   * @param {object} listener with onMessage(object), onFrame(frame), onLost(waitMs) and onTokenAsked()
+   */
+  constructor(listener) {
+    this.listener = listener;
+  }
+
+  open() {
+    clearTimeout(this.#timer);
+    const url = new URL("/v1/live", location.href);
+    url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    const socket = new WebSocket(url, protocols());
+    this.#socket = socket;
+    socket.binaryType = "arraybuffer";
+    socket.onmessage = ({ data }) => this.#take(data);
+    socket.onclose = ({ code }) => {
+      if (socket === this.#socket) this.#lost(code);
+    };
+  }
+
+  /** Send a message; false if there is nobody to send it to. */
+  send(message) {
+    if (this.#socket?.readyState !== WebSocket.OPEN) return false;
+    this.#socket.send(JSON.stringify(message));
+    return true;
+  }
+
+  #take(data) {
+    if (typeof data !== "string") {
+      const frame = readFrame(data);
+      if (frame) this.listener.onFrame(frame);
+      return;
+    }
+    const message = JSON.parse(data);
+    if (message.type === "hello") this.#wait = FIRST_WAIT_MS;
+    this.listener.onMessage(message);
+  }
+
+  async #lost(code) {
+    this.#socket = null;
+    if (code === NO_TOKEN || (await refusesToken())) {
+      this.listener.onTokenAsked();
+      return;
+    }
+    if (this.#socket) return; // opened by hand meanwhile
+    const wait = this.#wait;
+    this.#wait = Math.min(2 * wait, LONGEST_WAIT_MS);
+    this.#timer = setTimeout(() => this.open(), wait * (0.8 + 0.4 * Math.random()));
+    this.listener.onLost(wait);
+  }
+}
+
+/** A refused WebSocket does not say why; a plain request does. */
+async function refusesToken() {
+  try {
+    const answer = await fetch("/v1/status", { headers: authorization(), cache: "no-store" });
+    return answer.status === 401;
+  } catch {
+    return false;
+  }
+}
+
+/** Browsers can give a WebSocket no header but this one; in the URL a token would be logged. */
+function protocols() {
+  if (token() === null) return [];
+  const bytes = new TextEncoder().encode(token());
+  const text = btoa(String.fromCharCode(...bytes));
+  return ["firstfix", `token.${text.replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "")}`];
+}

@@ -1,0 +1,97 @@
+/** Places where the robot may be: numbered ghosts, with how likely each is. */
+
+import { percent } from "../words.js";
+import { robotRadius } from "./robot.js";
+
+const LEAST_TARGET_PX = 24; // a finger must be able to hit it
+const FONT = "600 12px system-ui, sans-serif";
+const HOPELESS = 0.01; // below this a ghost is small and says no number, unless it is marked
+
+export function drawHypotheses(ctx, view, ghosts, marked, colours) {
+  // The most likely last, so that it lies on top.
+  for (let i = ghosts.length - 1; i >= 0; i--) {
+    drawGhost(ctx, view, ghosts[i], i, i === marked, colours);
+  }
+}
+
+function drawGhost(ctx, view, { pose, probability }, index, isMarked, colours) {
+  const isHopeless = probability < HOPELESS && !isMarked;
+  const radius = isHopeless ? 5 : Math.max(robotRadius(view), 11);
+  ctx.save();
+  ctx.translate(...view.toScreen(pose[0], pose[1]));
+  ctx.strokeStyle = ctx.fillStyle = colours.ghost;
+  if (isHopeless) {
+    ctx.globalAlpha = 0.55;
+    drawPointer(ctx, pose[2], radius, isMarked);
+    ctx.restore();
+    return;
+  }
+  drawPointer(ctx, pose[2], radius, isMarked);
+  drawDisc(ctx, radius, isMarked, colours);
+  ctx.font = FONT;
+  ctx.textAlign = "center";
+  ctx.textBaseline = "middle";
+  ctx.fillStyle = isMarked ? colours["on-accent"] : colours.ghost;
+  ctx.fillText(String(index + 1), 0, 0.5);
+  drawLabel(ctx, percent(probability), radius, pose[2], colours);
+  ctx.restore();
+}
+
+function drawPointer(ctx, yaw, radius, isMarked) {
+  ctx.save();
+  ctx.rotate(-yaw);
+  ctx.beginPath();
+  const wide = Math.min(6, radius);
+  ctx.moveTo(radius + 9, 0);
+  ctx.lineTo(radius - 1, wide);
+  ctx.lineTo(radius - 1, -wide);
+  ctx.closePath();
+  ctx.fill();
+  if (isMarked) {
+    ctx.globalAlpha = 0.25;
+    ctx.beginPath();
+    ctx.arc(0, 0, radius + 14, 0, 2 * Math.PI);
+    ctx.fill();
+  }
+  ctx.restore();
+}
+
+function drawDisc(ctx, radius, isMarked, colours) {
+  ctx.beginPath();
+  ctx.arc(0, 0, radius, 0, 2 * Math.PI);
+  ctx.fillStyle = isMarked ? colours.ghost : colours.surface;
+  ctx.globalAlpha = isMarked ? 1 : 0.88;
+  ctx.fill();
+  ctx.globalAlpha = 1;
+  ctx.lineWidth = 2;
+  ctx.setLineDash(isMarked ? [] : [4, 3]);
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+/** The label goes behind the robot's back, where its pointer is not. */
+function drawLabel(ctx, text, radius, yaw, colours) {
+  const below = Math.sin(yaw) > -0.2;
+  const y = (below ? 1 : -1) * (radius + 13);
+  const width = ctx.measureText(text).width + 12;
+  ctx.beginPath();
+  ctx.roundRect(-width / 2, y - 9.5, width, 18, 9);
+  ctx.fillStyle = colours.surface;
+  ctx.globalAlpha = 0.92;
+  ctx.fill();
+  ctx.globalAlpha = 1;
+  ctx.fillStyle = colours.ghost;
+  ctx.fillText(text, 0, y);
+}
+
+/** The ghost at a point of the window, or -1. */
+export function ghostAt(view, ghosts, px, py) {
+  const reach = Math.max(robotRadius(view), LEAST_TARGET_PX);
+  let [best, nearest] = [-1, reach];
+  ghosts.forEach(({ pose }, i) => {
+    const [x, y] = view.toScreen(pose[0], pose[1]);
+    const distance = Math.hypot(px - x, py - y);
+    if (distance < nearest) [best, nearest] = [i, distance];
+  });
+  return best;
+}

@@ -1,0 +1,186 @@
+/** The page: what comes from the robot goes to scene and panel, what a person does goes back. */
+
+import { Actions } from "./actions.js";
+import { Camera } from "./camera.js";
+import { Connection } from "./connection.js";
+import { Gestures } from "./gestures.js";
+import { listenToKeys } from "./keyboard.js";
+import { boundsOf } from "./layers/map.js";
+import { Notices } from "./notices.js";
+import { Panel } from "./panel.js";
+import { Scene } from "./scene.js";
+import { Sheet } from "./sheet.js";
+import { Stage } from "./stage.js";
+import { Theme } from "./theme.js";
+import { Timeline } from "./timeline.js";
+import { authorization, keepToken, takeTokenFromFragment } from "./token.js";
+import { View } from "./view.js";
+import { metres } from "./words.js";
+
+const byId = (id) => document.getElementById(id);
+const app = byId("app");
+const redraw = () => stage.invalidate();
+
+takeTokenFromFragment();
+
+const scene = new Scene();
+const view = new View();
+const notices = new Notices();
+const timeline = new Timeline();
+const theme = new Theme();
+const camera = new Camera(view, scene, redraw);
+const stage = new Stage(view, scene, theme.colours, beforeFrame);
+const sheet = new Sheet(() => stage.resize(sheet.covered()));
+const connection = new Connection({
+  onMessage: take,
+  onFrame(frame) {
+    scene.takeFrame(frame);
+    redraw();
+  },
+  onLost(waitMs) {
+    app.dataset.connected = "false";
+    notices.showLost(waitMs);
+  },
+  onTokenAsked: askForToken,
+});
+const actions = new Actions(connection, scene, view, notices, redraw);
+const panel = new Panel({
+  onPick: (index) => actions.pick(index),
+  onMark: mark,
+  onNewState: (text) => notices.speak(text),
+});
+
+// ---- from the robot
+
+function take(message) {
+  if (message.type === "hello") greet(message);
+  else if (message.type === "state") takeState(message);
+  else if (message.type === "event") timeline.add(message);
+  else if (message.type === "error") notices.complain(message.detail);
+}
+
+function greet(hello) {
+  app.dataset.connected = "true";
+  notices.hideLost();
+  scene.forgetRobot();
+  timeline.replace(hello.events);
+  actions.allow(hello.may_steer, hello.abilities);
+  document.querySelector("[data-layer=truth]").hidden = hello.robot !== "sim";
+  if (hello.map) showMap(hello.map);
+}
+
+function takeState(state) {
+  scene.takeState(state);
+  panel.show(state);
+  app.dataset.pose = numbers(state.pose);
+  app.dataset.truth = numbers(state.truth);
+  redraw();
+}
+
+async function showMap(map) {
+  panel.showMap(map);
+  if (scene.image && JSON.stringify(map) === JSON.stringify(scene.map)) return;
+  try {
+    scene.image = await pictureOf(map);
+  } catch (problem) {
+    notices.complain(`The picture of the map did not come: ${problem.message}.`);
+    return;
+  }
+  scene.map = map;
+  view.bounds = boundsOf(map);
+  stage.recolour();
+  camera.fit();
+  app.dataset.map = map.name;
+  performance.mark("map-shown");
+}
+
+async function pictureOf(map) {
+  const answer = await fetch(map.image.url, { headers: authorization() });
+  if (!answer.ok) throw new Error(`status ${answer.status}`);
+  return createImageBitmap(await answer.blob());
+}
+
+function askForToken() {
+  app.dataset.connected = "false";
+  const dialog = byId("token-dialog");
+  if (!dialog.open) dialog.showModal();
+}
+
+// ---- on the screen
+
+function beforeFrame(now) {
+  camera.frame(now);
+  app.dataset.view = numbers([view.scale, view.x, view.y, ...view.middle]);
+}
+
+function mark(index) {
+  if (scene.marked === index) return;
+  scene.marked = index;
+  redraw();
+}
+
+function hover(place, ghost = -1) {
+  byId("cursor-text").textContent = place ? `${metres(place[0])}, ${metres(place[1])}` : "";
+  mark(ghost);
+  app.dataset.over = ghost >= 0 && actions.maySteer ? "ghost" : "";
+}
+
+/** For tests and for the curious: what is shown, readable from outside. */
+function numbers(values) {
+  return values ? values.map((value) => value.toFixed(4)).join(" ") : "";
+}
+
+// ---- from the person
+
+new Gestures(byId("overlay"), view, scene, {
+  onViewed: () => camera.movedByHand(),
+  onHover: hover,
+  onDraft: redraw,
+  onSet: () => actions.set(),
+  onPick: (index) => actions.pick(index),
+  onNoPull: () => actions.needsPull(),
+  onLongPress: () => actions.enterPoseMode(),
+});
+
+listenToKeys({
+  view,
+  scene,
+  actions,
+  onViewed: () => camera.movedByHand(),
+  onDraft: redraw,
+  commands: {
+    f: () => camera.fit(),
+    l: () => camera.toggleFollow(),
+    d: () => theme.toggle(),
+    p: () => actions.toggleModeByKey("pose"),
+    g: () => actions.toggleModeByKey("goal"),
+    c: () => actions.toggleModeByKey("carry"),
+    r: () => actions.relocalize(),
+    Space: () => actions.togglePause(),
+    escape: () => actions.leaveMode(),
+    "?": () => byId("help-dialog").showModal(),
+  },
+});
+
+theme.onChange = () => stage.recolour();
+byId("theme").addEventListener("click", () => theme.toggle());
+byId("help").addEventListener("click", () => byId("help-dialog").showModal());
+byId("retry").addEventListener("click", () => connection.open());
+byId("token-form").addEventListener("submit", () => {
+  keepToken(byId("token").value);
+  byId("token").value = "";
+  connection.open();
+});
+byId("token-dialog").addEventListener("cancel", (event) => event.preventDefault());
+for (const chip of document.querySelectorAll("#show .chip")) {
+  chip.addEventListener("click", () => {
+    const { layer } = chip.dataset;
+    scene.shown[layer] = !scene.shown[layer];
+    chip.setAttribute("aria-pressed", String(scene.shown[layer]));
+    redraw();
+  });
+}
+
+addEventListener("resize", () => stage.resize(sheet.covered()));
+stage.resize(sheet.covered());
+connection.open();

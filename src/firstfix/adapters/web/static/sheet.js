@@ -1,0 +1,61 @@
+/** On a phone the panel is a sheet at the bottom: a head that stays, and details to pull up. */
+
+const NARROW = "(max-width: 719px)";
+const SWIPE_PX = 24;
+
+export class Sheet {
+  #panel = document.getElementById("panel");
+  #handle = document.getElementById("sheet-handle");
+  #narrow = matchMedia(NARROW);
+  #startY = 0;
+  #swiped = false;
+
+  constructor(onChange) {
+    this.onChange = onChange;
+    this.#handle.addEventListener("click", () => {
+      if (!this.#swiped) this.#open(!this.isOpen);
+      this.#swiped = false;
+    });
+    this.#listenToSwipes();
+    this.#narrow.addEventListener("change", onChange);
+    new ResizeObserver(onChange).observe(this.#panel);
+  }
+
+  get isNarrow() {
+    return this.#narrow.matches;
+  }
+
+  get isOpen() {
+    return this.#handle.getAttribute("aria-expanded") === "true";
+  }
+
+  /** How much of the window the panel and the bars cover, px. */
+  covered() {
+    const box = this.#panel.getBoundingClientRect();
+    if (!this.isNarrow) return { left: 0, top: 0, right: innerWidth - box.left, bottom: 0 };
+    const head = document.getElementById("state").getBoundingClientRect().bottom - box.top + 10;
+    const tools = document.getElementById("tools");
+    document.getElementById("app").style.setProperty("--sheet-head", `${head}px`);
+    return { left: 0, top: 0, right: 0, bottom: head + (tools.hidden ? 0 : tools.offsetHeight + 8) };
+  }
+
+  #open(open) {
+    this.#handle.setAttribute("aria-expanded", String(open));
+    this.#handle.setAttribute("aria-label", open ? "Hide details" : "Show details");
+    this.onChange();
+  }
+
+  #listenToSwipes() {
+    this.#handle.addEventListener("pointerdown", (event) => {
+      this.#startY = event.clientY;
+      this.#swiped = false;
+      this.#handle.setPointerCapture(event.pointerId);
+    });
+    this.#handle.addEventListener("pointerup", (event) => {
+      const up = this.#startY - event.clientY;
+      if (Math.abs(up) < SWIPE_PX) return;
+      this.#swiped = true;
+      this.#open(up > 0);
+    });
+  }
+}

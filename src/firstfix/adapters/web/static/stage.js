@@ -1,0 +1,94 @@
+/** Two canvases, one for the map and one for what moves on it; drawn when something changed. */
+
+import { drawDraft, drawGoal } from "./layers/draft.js";
+import { drawGrid } from "./layers/grid.js";
+import { drawHypotheses } from "./layers/hypotheses.js";
+import { colourMap, drawMap } from "./layers/map.js";
+import { drawParticles } from "./layers/particles.js";
+import { drawRobot, drawTruth } from "./layers/robot.js";
+import { drawScan, drawSight } from "./layers/scan.js";
+import { drawTrail } from "./layers/trail.js";
+
+export class Stage {
+  #ground = document.getElementById("ground");
+  #overlay = document.getElementById("overlay");
+  #coloured = null; // the map in the colours of the theme
+  #drawnVersion = -1;
+  #asked = false;
+  #changed = true;
+
+  constructor(view, scene, colours, onFrame) {
+    Object.assign(this, { view, scene, colours, onFrame });
+  }
+
+  /** Fit the canvases to the window. */
+  resize(covered) {
+    const { clientWidth: width, clientHeight: height } = this.#overlay.parentElement;
+    for (const canvas of [this.#ground, this.#overlay]) {
+      canvas.width = Math.round(width * devicePixelRatio);
+      canvas.height = Math.round(height * devicePixelRatio);
+    }
+    this.view.resize(width, height, covered);
+    this.invalidate();
+  }
+
+  /** The colours or the map are new. */
+  recolour() {
+    this.#coloured = this.scene.image ? colourMap(this.scene.image, this.colours) : null;
+    this.#drawnVersion = -1;
+    this.invalidate();
+  }
+
+  /** Something on the map changed; it is drawn with the next frame of the screen. */
+  invalidate() {
+    this.#changed = true;
+    if (this.#asked) return;
+    this.#asked = true;
+    requestAnimationFrame((now) => {
+      this.#asked = false;
+      this.#frame(now);
+    });
+  }
+
+  #frame(now) {
+    this.onFrame(now);
+    if (this.#drawnVersion !== this.view.version) {
+      this.#drawnVersion = this.view.version;
+      this.#changed = true;
+      this.#drawGround();
+    }
+    if (this.#changed) this.#drawOverlay();
+    this.#changed = false;
+  }
+
+  #drawGround() {
+    const { view, colours, scene } = this;
+    const ctx = cleared(this.#ground, view);
+    drawGrid(ctx, view, colours);
+    if (this.#coloured) drawMap(ctx, view, scene.map, this.#coloured);
+  }
+
+  #drawOverlay() {
+    const { view, colours, scene } = this;
+    const { state, shown, ghosts } = scene;
+    const ctx = cleared(this.#overlay, view);
+    const pose = state?.pose ?? null;
+    if (shown.scan && scene.scan && pose) drawSight(ctx, view, scene.scan, pose, colours);
+    if (shown.trail && scene.trail.length) drawTrail(ctx, view, scene.trail, colours);
+    if (shown.scan && scene.scan) drawScan(ctx, view, scene.scan, colours);
+    if (shown.particles && scene.particles) drawParticles(ctx, view, scene.particles, colours);
+    if (scene.goal) drawGoal(ctx, view, scene.goal, pose, colours);
+    if (shown.truth && state?.truth) drawTruth(ctx, view, state.truth, colours);
+    if (pose) drawRobot(ctx, view, pose, state.covariance, colours);
+    if (ghosts.length) drawHypotheses(ctx, view, ghosts, scene.marked, colours);
+    if (scene.draft) drawDraft(ctx, view, scene.draft, colours);
+  }
+}
+
+function cleared(canvas, view) {
+  const ctx = canvas.getContext("2d");
+  const ratio = canvas.width / view.width;
+  ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+  ctx.clearRect(0, 0, view.width, view.height);
+  return ctx;
+}
