@@ -1,0 +1,69 @@
+"""The docs say what is true: their code runs, their links lead somewhere, their tables are made."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted([*DOCS.rglob("*.md"), *ROOT.glob("*.md")])
+PYTHON = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+COMMAND = re.compile(r"^    (firstfix .*)$", re.MULTILINE)
+LINK = re.compile(r"\[[^\]]*\]\(([^)#]+)(?:#[^)]*)?\)")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_to_files(page):
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    text = re.sub(r"`[^`]*`", "", text)
+    for link in LINK.findall(text):
+        if not link.startswith(("http://", "https://", "mailto:")):
+            assert (page.parent / link).exists(), f"{page.name} links to {link}"
+
+
+def test_settings_are_those_of_the_dataclasses():
+    spec = importlib.util.spec_from_file_location("make_settings", DOCS / "make_settings.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    written = (DOCS / "reference" / "settings.md").read_text(encoding="utf-8")
+    assert written == module.page(), "run: python docs/make_settings.py"
+
+
+def test_every_page_is_in_the_table_of_contents():
+    contents = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    for page in DOCS.rglob("*.md"):
+        name = page.relative_to(DOCS).as_posix()
+        assert name in contents or name.startswith("decisions/"), f"mkdocs.yml does not name {name}"
+
+
+@pytest.mark.slow
+def test_the_tutorial_works_when_it_is_followed(tmp_path):
+    """All its commands and programs, in their order, in one folder; then the page on products."""
+    text = (DOCS / "tutorial.md").read_text(encoding="utf-8")
+    steps = sorted(
+        [(m.start(), "python", m.group(1)) for m in PYTHON.finditer(text)]
+        + [(m.start(), "command", m.group(1)) for m in COMMAND.finditer(text)]
+    )
+    assert [kind for _, kind, _ in steps].count("command") >= 4
+    product = PYTHON.search((DOCS / "howto" / "product.md").read_text(encoding="utf-8"))
+    assert product is not None
+    for _, kind, code in [*steps, (0, "python", product.group(1))]:
+        if kind == "python":
+            run = [sys.executable, "-c", code]
+        else:
+            run = [sys.executable, "-m", *code.split()]
+        done = subprocess.run(
+            run, cwd=tmp_path, env=dict(os.environ), capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, f"{code}\n{done.stdout}\n{done.stderr}"
+    for name in ("office.yaml", "drive.npz", "found.png", "track.png", "track.tum"):
+        assert (tmp_path / name).stat().st_size > 0
