@@ -32,6 +32,8 @@ from firstfix.system.transitions import State
 
 # Of these some may still be on their way back to here.
 _OWN_POSES = 10
+# A robot that is not found says why in the log that often, s.
+_REMIND_S = 10.0
 
 _LEVELS = {
     State.NO_MAP: Level.ERROR,
@@ -58,6 +60,7 @@ class Announcer:
         self._map = config.amcl.global_frame_id
         self._state: State | None = None
         self._status_at = -math.inf
+        self._logged_at = -math.inf
         self._cloud_at = -math.inf
         self._motion: MotionRequest | None = None
         self._places = 0
@@ -74,6 +77,9 @@ class Announcer:
         particles : Particles or None
             The belief now.
         """
+        if any(isinstance(output, Hypotheses) for output in outputs):
+            # Before the status, which tells of it.
+            self._motion = next((o for o in outputs if isinstance(o, MotionRequest)), None)
         for output in outputs:
             if isinstance(output, InitialPose):
                 if self._config.mode is Mode.BOOTSTRAP:
@@ -82,9 +88,7 @@ class Announcer:
                 self._announce_tracked(output, particles)
             elif isinstance(output, Hypotheses):
                 self._announce_places(output.stamp, [place.pose for place in output.places])
-            elif isinstance(output, MotionRequest):
-                self._motion = output
-            else:
+            elif isinstance(output, Status):
                 self._announce_status(output)
 
     def is_own(self, message: Any) -> bool:
@@ -103,8 +107,6 @@ class Announcer:
         return pose_with_covariance(make, at.stamp, self._map, at.T_map_base, at.covariance)
 
     def _announce_tracked(self, tracked: TrackedPose, particles: Particles | None) -> None:
-        if self._places:
-            self._announce_places(tracked.stamp, [])  # there is one place now, and it has a topic
         if self._config.mode is Mode.BOOTSTRAP:
             before, self._pose_listeners = (
                 self._pose_listeners,
@@ -125,7 +127,7 @@ class Announcer:
 
     def _announce_particles(self, stamp: float, particles: Particles) -> None:
         rate, topic = self._config.cloud_rate, self._transport.particles
-        is_due = rate > 0.0 and not 0.0 <= stamp - self._cloud_at < 1.0 / rate
+        is_due = rate > 0.0 and _is_due(stamp, self._cloud_at, 1.0 / rate)
         if not is_due or not self._transport.listeners(topic):
             return
         self._cloud_at = stamp
@@ -138,17 +140,21 @@ class Announcer:
 
     def _announce_places(self, stamp: float, poses: list[SE2]) -> None:
         self._places = len(poses)
-        self._motion = None
         message = pose_array(self._transport.make, stamp, self._map, poses)
         self._transport.publish(HYPOTHESES, message)
 
     def _announce_status(self, status: Status) -> None:
+        if self._places and status.state is not State.TRACKING:
+            self._announce_places(status.stamp, [])  # there is one place now, or none
+            self._motion = None
         has_changed = status.state is not self._state
-        is_due = not 0.0 <= status.stamp - self._status_at < 1.0 / self._config.status_rate
+        is_lost = status.state in (State.SEARCHING, State.TRACKING)
+        if has_changed or (is_lost and _is_due(status.stamp, self._logged_at, _REMIND_S)):
+            self._logged_at = status.stamp
+            self._transport.log(Gravity.INFO, f"{status.state.value}: {status.reason}")
+        is_due = _is_due(status.stamp, self._status_at, 1.0 / self._config.status_rate)
         if not has_changed and not is_due:
             return
-        if has_changed:
-            self._transport.log(Gravity.INFO, f"{status.state.value}: {status.reason}")
         self._state, self._status_at = status.state, status.stamp
         message = diagnostics(
             self._transport.make,
@@ -171,3 +177,8 @@ class Announcer:
             values["turn_rad"] = f"{self._motion.turn:.2f}"
             values["ahead_m"] = f"{self._motion.ahead:.2f}"
         return values
+
+
+def _is_due(stamp: float, last: float, pause_s: float) -> bool:
+    """Tell whether a pause is over, or the clock was set back."""
+    return not 0.0 <= stamp - last < pause_s

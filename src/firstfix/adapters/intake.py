@@ -59,7 +59,7 @@ class Intake:
         self._waiting: deque[Any] = deque(maxlen=_MOST_WAITING)
         self._left_out: Counter[str] = Counter()
         self._pressed: set[tuple[Heard, int]] = set()
-        self._map_key = ""
+        self._map_key = self._map_key_before = ""
 
     @property
     def map_key(self) -> str:
@@ -101,7 +101,7 @@ class Intake:
         if heard is Heard.INITIAL_POSE:
             return self._take_hint(message)
         if heard is Heard.INPUT:
-            return [message]
+            return self.use_map(message) if isinstance(message, NewMap) else [message]
         if heard is Heard.RESET:
             return [Reset(self._now)]
         if heard is Heard.UPDATE:
@@ -113,8 +113,12 @@ class Intake:
         key = map_key(given.grid)
         if key == self._map_key:
             return []
-        self._map_key = key
+        self._map_key_before, self._map_key = self._map_key, key
         return [given]
+
+    def take_back_map(self) -> None:
+        """Go back to the map before, because the last one cannot be searched."""
+        self._map_key = self._map_key_before
 
     @property
     def _now(self) -> float:
@@ -131,9 +135,11 @@ class Intake:
             return self._leave_out(f"odometry ({odom} -> {base}) is not known: {reach.why}")
         place = self._frames.laser_at(frame, stamp)
         if isinstance(place, NotKnown):
+            has_room = len(self._waiting) < _MOST_WAITING
             if place.later:
                 self._waiting.append(message)
-                return []
+                if has_room:
+                    return []
             return self._leave_out(f"the place of the laser is not known: {place.why}")
         if stamp - reach > _LAG_S:
             lag = f"odometry is {stamp - reach:.1f} s behind the scans: do the clocks agree?"
@@ -156,7 +162,15 @@ class Intake:
         if back_s > 0.0:
             self._complain("clock", f"time went back by {back_s:.1f} s: beginning anew")
             return [Reset(self._now), *inputs]
-        return [*inputs, *(given for message in waiting for given in self._take_scan(message))]
+        # Of the scans that are known now, the newest wins.
+        known = [taken for message in waiting if (taken := self._take_waited(message))]
+        return [*inputs, *(known[-1] if known else ())]
+
+    def _take_waited(self, message: Any) -> list[Input]:
+        try:
+            return self._take_scan(message)
+        except InputError as error:  # which odometry must not suffer from
+            return self._leave_out(f"a scan cannot be used: {error}")
 
     def _take_map(self, message: Any) -> list[Input]:
         if self._map_key and self._config.first_map_only:
@@ -167,11 +181,13 @@ class Intake:
         return self.use_map(NewMap(to_seconds(message.header.stamp), to_grid(message)))
 
     def _take_hint(self, message: Any) -> list[Input]:
-        said = to_pose(message)
-        if said.parent != self._config.global_frame_id:
+        said, expected = to_pose(message), self._config.global_frame_id
+        if not said.parent:  # as AMCL does it
+            self._complain("hint frame", f"an initial pose names no frame: taken as in {expected}")
+        elif said.parent != expected:
             raise InputError(
-                expected=f"an initial pose in {self._config.global_frame_id}",
-                received=f"one in {said.parent or 'a frame without a name'}",
+                expected=f"an initial pose in {expected}",
+                received=f"one in {said.parent}",
                 remedy="set the fixed frame of the viewer to the frame of the map",
             )
         return [PoseHint(said.stamp or self._now, to_planar(said))]

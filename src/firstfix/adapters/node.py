@@ -13,13 +13,15 @@ from typing import Any
 from firstfix.adapters.announcer import Announcer
 from firstfix.adapters.inbox import Inbox
 from firstfix.adapters.intake import Intake
+from firstfix.adapters.pose_memory import PoseMemory
 from firstfix.adapters.topics import Heard, heard_topics
 from firstfix.adapters.transport import Gravity, Transport
 from firstfix.adapters.warm_up import warm_up
-from firstfix.core.errors import InputError
+from firstfix.core.errors import InputError, MapError
 from firstfix.core.scan import LaserScan
 from firstfix.fields.cache import cache_folder
 from firstfix.formats.map_server import load_map
+from firstfix.global_localization.answer import check_searchable
 from firstfix.system.config import LocalizerConfig
 from firstfix.system.inputs import Input, NewMap
 from firstfix.system.localizer import Localizer
@@ -58,6 +60,7 @@ class Node:
         self._inbox: Inbox[tuple[Heard, Any]] = Inbox()
         self._intake = Intake(config.amcl, self.complain)
         self._announcer = Announcer(config, transport)
+        self._memory = PoseMemory(config, transport.log)
         self._localizer = Localizer(LocalizerConfig(amcl=config.amcl), cache_folder())
         self._said_at: dict[str, float] = {}
         self._heard: set[Heard] = set()
@@ -74,13 +77,16 @@ class Node:
             If the file of the map cannot be used.
         """
         if self._config.yaml_filename:
-            self._own_map = NewMap(0.0, load_map(Path(self._config.yaml_filename)))
+            grid = load_map(Path(self._config.yaml_filename))
+            check_searchable(grid)
+            self._own_map = NewMap(0.0, grid)
         self._worker.start()
 
     def stop(self) -> None:
         """End, after what is being thought now, unless that takes long."""
         self._inbox.close()
-        self._worker.join(_END_S)
+        if self._worker.is_alive():
+            self._worker.join(_END_S)
 
     def hear(self, heard: Heard, message: Any = None) -> None:
         """Take in a message or a request; returns at once.
@@ -106,7 +112,7 @@ class Node:
         """
         self.hear(Heard.INPUT, given)
 
-    def complain(self, subject: str, text: str) -> None:
+    def complain(self, subject: str, text: str, gravity: Gravity = Gravity.WARNING) -> None:
         """Write a warning, unless there was one on this subject a moment ago.
 
         Parameters
@@ -115,26 +121,34 @@ class Node:
             What it is about.
         text : str
             For people.
+        gravity : Gravity, optional
+            How grave it is.
         """
         now = time.monotonic()
         if now - self._said_at.get(subject, -_REPEAT_S) >= _REPEAT_S:
             self._said_at[subject] = now
-            self._transport.log(Gravity.WARNING, text)
+            self._transport.log(gravity, text)
 
     def _work(self) -> None:
         self._try(self._make_ready)
         self._looked_at = time.monotonic()
         while not self._inbox.is_closed:
-            for heard, message in self._inbox.take(_LOOK_S):
-                self._heard.add(heard)
-                self._try(self._take, heard, message)
+            self._take_all(self._inbox.take(_LOOK_S))
             if time.monotonic() - self._looked_at >= _LOOK_S:
                 self._say_what_is_missing()
+        self._try(self._memory.close)
 
     def _make_ready(self) -> None:
         warm_up(self._config.amcl)
         if self._own_map is not None:
             self._give(self._intake.use_map(self._own_map))
+
+    def _take_all(self, items: list[tuple[Heard, Any]]) -> None:
+        for heard, message in items:
+            if self._inbox.is_closed:
+                return
+            self._heard.add(Heard.SCAN if isinstance(message, LaserScan) else heard)
+            self._try(self._take, heard, message)
 
     def _take(self, heard: Heard, message: Any) -> None:
         if heard is Heard.INITIAL_POSE and self._announcer.is_own(message):
@@ -143,19 +157,32 @@ class Node:
 
     def _give(self, inputs: list[Input]) -> None:
         for given in inputs:
+            self._handle(given)
+            hint = self._memory.hint_after(given)
+            if hint is not None:
+                self._handle(hint)
+
+    def _handle(self, given: Input) -> None:
+        try:
             outputs = self._localizer.handle(given)
-            self._announcer.announce(outputs, self._localizer.particles)
-            for watch in self._watchers:
-                watch(given, outputs, self._localizer)
+        except MapError:
+            self._intake.take_back_map()
+            raise
+        self._announcer.announce(outputs, self._localizer.particles)
+        self._memory.keep(outputs)
+        for watch in self._watchers:
+            watch(given, outputs, self._localizer)
 
     def _try(self, step: Any, *given: Any) -> None:
         """Do something that must not end the node, whatever came over the wire."""
         try:
             step(*given)
         except InputError as error:
-            self.complain(str(error)[:40], f"{error}")
+            # Not by its text, which may have another number each time.
+            self.complain(f"{type(error).__name__} {given[:1]}", f"{error}")
         except Exception:  # noqa: BLE001 - a node that died silently would be worse
-            self.complain("error", f"an error of firstfix itself:\n{traceback.format_exc()}")
+            text = f"an error of firstfix itself:\n{traceback.format_exc()}"
+            self.complain("error", text, Gravity.ERROR)
 
     def _say_what_is_missing(self) -> None:
         """Name the topics that were silent since the last look; whether others spoke or not."""

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from firstfix.core.recording import Recording
     from firstfix.evaluation.drive import Drive
     from firstfix.evaluation.track import TrackedScan
+    from firstfix.formats.saved_pose import SavedPose
 
 NO_ANSWER = 1
 
@@ -101,12 +102,12 @@ def track(
     begin = choose_start(said, grid, recording, config)
     for note in (*recording.notes, begin.note):
         typer.echo(f"note: {note}", err=True)
-    keeper = None
+    keeper, key = None, ""
     if keep_pose is not None:
-        from firstfix.cli.pose_keeper import PoseKeeper
+        from firstfix.adapters.pose_keeper import PoseKeeper
         from firstfix.formats.saved_pose import map_key
 
-        keeper = PoseKeeper(keep_pose, map_key(grid), config.save_pose_rate)
+        keeper, key = PoseKeeper(keep_pose, config.save_pose_rate), map_key(grid)
     if begin.origin is Origin.SEARCH:
         drive, tracked = _searched(recording, grid, config)
     else:
@@ -120,13 +121,13 @@ def track(
             for scan in follow_drive(drive, tracker, config, begin.covariance, rng):
                 tracked.append(scan)
                 if keeper is not None:
-                    keeper.offer(scan)
+                    keeper.offer(_saved(scan, key))
                 done(f"{scan.particles} particles")
     for note in drive.notes:
         typer.echo(f"note: {note}", err=True)
     figures = summarize_track(tracked)
     if keeper is not None:
-        keeper.save(tracked[-1])
+        keeper.save(_saved(tracked[-1], key))
     if out is not None:
         from firstfix.formats.tum import save_tum
 
@@ -153,6 +154,18 @@ def _searched(
     except NeverFoundError as error:
         typer.echo(f"{error}")
         raise typer.Exit(NO_ANSWER) from None
+
+
+def _saved(tracked: TrackedScan, map_key: str) -> SavedPose:
+    from firstfix.formats.saved_pose import SavedPose
+
+    return SavedPose(
+        T_map_base=tracked.T_map_base,
+        covariance=tracked.covariance,
+        stamp=tracked.sight.scan.stamp,
+        T_odom_base=tracked.sight.T_odom_base,
+        map_key=map_key,
+    )
 
 
 def _check_targets(out: Path | None, plot: Path | None, keep_pose: Path | None) -> None:

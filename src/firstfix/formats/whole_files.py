@@ -129,6 +129,22 @@ def write_whole(target: Path, pieces: Iterable[bytes | memoryview]) -> None:
             os.close(folder)
 
 
+def remove_file(path: Path) -> None:
+    """Remove a file, if there is one.
+
+    Raises
+    ------
+    InputError
+        If it stays there.
+    """
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise unreachable(path, error) from error
+    except ValueError:  # a name that no file system can hold
+        return
+
+
 def unreachable(path: Path, error: OSError) -> InputError:
     """Return the error for a file that cannot be opened, read or written."""
     return InputError(

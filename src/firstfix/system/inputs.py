@@ -28,7 +28,7 @@ class NewMap:
 
 @dataclass(frozen=True, slots=True)
 class PoseHint:
-    """A person says where the robot is; good to about a metre and 40 degrees.
+    """Somebody says where the robot is; good to about a metre and 40 degrees.
 
     Parameters
     ----------
@@ -36,10 +36,13 @@ class PoseHint:
         Time, s.
     T_map_base : SE2
         The pose.
+    source : str
+        Who says so, in the words that people will read.
     """
 
     stamp: float
     T_map_base: SE2
+    source: str = "a person"
 
 
 @dataclass(frozen=True, slots=True)

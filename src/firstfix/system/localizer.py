@@ -36,7 +36,7 @@ _BEGIN_COVARIANCE = np.diag([0.03**2, 0.03**2, np.radians(1.0) ** 2])
 _PATIENCE_S = 1.0
 _MOVED_M = 0.1
 
-# Where a person says the robot is, it must fit nearly as well as at the best place of the map.
+# Where somebody says the robot is, it must fit nearly as well as at the best place of the map.
 _AS_GOOD = 1.5
 _GOOD_COST = 0.3
 
@@ -75,7 +75,7 @@ class Localizer:
         self._found_nothing_at: tuple[float, SE2] | None = None
         self._update_asked = False
         self._looked_at = 0.0
-        self._hint: SE2 | None = None
+        self._hint: PoseHint | None = None
         self._lost_track: SE2 | None = None  # T_map_odom, if contradicted and not picked up since
         self._last_word_at: SE2 | None = None
         self._candidates = Candidates(self.config.watch)
@@ -165,9 +165,10 @@ class Localizer:
 
     def _take_hint(self, given: PoseHint) -> list[Output]:
         self._track = None
-        self._hint = given.T_map_base
+        self._hint = given
         self.state = after(self.state, Event.PERSON_SAID)
-        return [Status(given.stamp, self.state, "a person says where; the next scan will tell")]
+        reason = f"{given.source} says where; the next scan will tell"
+        return [Status(given.stamp, self.state, reason)]
 
     def _take_update_request(self, given: NoMotionUpdate) -> list[Output]:
         self._update_asked = True
@@ -237,18 +238,19 @@ class Localizer:
         reason = f"{left} places left, the best at {best.probability:.0%}; motion would decide"
         return self._tell_places(scan, reason)
 
-    def _check_hint(self, scan: LaserScan, T_odom_base: SE2, T_map_base: SE2) -> list[Output]:
+    def _check_hint(self, scan: LaserScan, T_odom_base: SE2, hint: PoseHint) -> list[Output]:
         self._hint = None
-        place = self._locator.locate_near(scan, T_map_base)
+        place = self._locator.locate_near(scan, hint.T_map_base)
         result = self._locator.locate(scan)
         best = result.best or place
         known = same_place(place.pose, best.pose, self.config.watch)
         elsewhere = result.verdict is Verdict.UNIQUE and not known
         as_good = place.score <= _AS_GOOD * max(best.score, _GOOD_COST)
         if as_good and not elsewhere and place.score <= self.config.watch.doubtful_cost:
-            reason = f"a person said where; {place.evidence.explained:.0%} of the beams fit there"
+            fit = f"{place.evidence.explained:.0%} of the beams fit there"
+            reason = f"{hint.source} said where; {fit}"
             return self._arrive(scan, T_odom_base, place, Event.PLACE_WON, reason)
-        reason = "a person said where, but the scan fits elsewhere, or nowhere: searching"
+        reason = f"{hint.source} said where, but the scan fits elsewhere, or nowhere: searching"
         return [self._forget(scan.stamp, Event.LOST, reason, place.evidence)]
 
     def _follow(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
