@@ -72,6 +72,22 @@ def test_twins_stay_twins_however_often_one_looks(three_rooms, three_rooms_locat
         assert max(place.probability for place in best) < 0.6
 
 
+def test_a_look_at_rest_tells_where_the_places_are_by_now(three_rooms, three_rooms_locator):
+    """A robot that creeps on brings no news for a while; its places creep on with it."""
+    lidar, rng = Lidar(beams=180), np.random.default_rng(0)
+    contest = begun(three_rooms_locator, POSE, lidar, rng)
+    [(_, pose)] = turning(contest, three_rooms, POSE, lidar, rng, 1)
+    crept = SE2(0.3, 0.0, 0.3)
+    assert not contest.brings_news(ODOM @ TURN @ crept)
+    seen = lidar.scan(three_rooms, pose @ crept, rng)
+    assert contest.look_at_rest(seen, ODOM @ TURN @ crept) is Standing.OPEN
+    best = contest.places[:3]
+    assert sorted(round(place.pose.x - (pose @ crept).x) for place in best) == [0, 8, 16]
+    for place in best:
+        room = SE2(round(place.pose.x - (pose @ crept).x), 0.0, 0.0)
+        assert place.pose.distance_to(room @ pose @ crept) < 0.1
+
+
 @pytest.mark.parametrize("room", [0.0, 7.0])
 @pytest.mark.parametrize("seed", range(3))
 def test_what_differs_decides_rightly(two_rooms, two_rooms_locator, half_lidar, room, seed):

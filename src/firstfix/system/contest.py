@@ -40,6 +40,10 @@ class Entry:
     log_weight: float
     place: Hypothesis
 
+    def carried(self, T_odom_base: SE2) -> Entry:
+        """Return the same place where the odometry has carried it."""
+        return replace(self, place=replace(self.place, pose=self.T_map_odom @ T_odom_base))
+
 
 class Contest:
     """Follows all places that fit, without chance, and weighs them where a scan brings news.
@@ -78,7 +82,7 @@ class Contest:
 
     @property
     def places(self) -> tuple[Hypothesis, ...]:
-        """The places as of the last look, with their probabilities in the contest, best first."""
+        """The places at the last look, with their probabilities in the contest, best first."""
         logs = np.array([*(entry.log_weight for entry in self._entries), self._log_unlisted])
         weights = np.exp(logs - logs.max())
         shares = (weights / weights.sum())[:-1].tolist()
@@ -136,6 +140,7 @@ class Contest:
         Standing
             WON or OPEN.
         """
+        self._entries = [entry.carried(T_odom_base) for entry in self._entries]
         result = self._locator.locate(scan)
         best = result.best
         if best is None or result.verdict is Verdict.NO_MATCH:
