@@ -19,7 +19,7 @@ from firstfix.cli.demo import demo
 from firstfix.cli.doctor import doctor
 from firstfix.cli.locate import locate
 from firstfix.cli.map import map_app
-from firstfix.cli.nodes import PASSED_ON, dds, ros1
+from firstfix.cli.nodes import PASSED_ON, dds, ros1, ros2
 from firstfix.cli.serve import serve
 from firstfix.cli.track import track
 from firstfix.core.errors import FirstfixError
@@ -42,6 +42,7 @@ app.add_typer(map_app, name="map")
 app.command()(demo)
 app.command()(serve)
 app.command(context_settings=PASSED_ON)(ros1)
+app.command(context_settings=PASSED_ON)(ros2)
 app.command()(dds)
 app.command()(doctor)
 

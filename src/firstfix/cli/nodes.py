@@ -29,6 +29,21 @@ def ros1(context: typer.Context) -> None:
     adapter.run(context.args)
 
 
+def ros2(context: typer.Context) -> None:
+    """Run the node for ROS 2, a lifecycle node: configure and activate it, or let it do so itself.
+
+    Arguments are those of `ros2 run`: `--ros-args -r scan:=base_scan -p mode:=full
+    -p autostart:=true`.
+    """
+    adapter = _load(
+        "ros2",
+        "rclpy",
+        "source /opt/ros/$ROS_DISTRO/setup.bash, and run firstfix in an environment "
+        "made by `/usr/bin/python3 -m venv --system-site-packages`; or try `firstfix dds`",
+    )
+    adapter.run(context.args)
+
+
 def dds(
     map_file: Annotated[
         Path | None, typer.Option("--map", help="Map to load; without it, hear it on `map`.")
