@@ -16,7 +16,7 @@ from firstfix.adapters.dds_domain import DomainSettings, domain_settings
 from firstfix.adapters.dds_ends import Receiver, Sender, Watch
 from firstfix.adapters.dds_graph import GRAPH, USER_DATA, entities
 from firstfix.adapters.dds_types import decode, make
-from firstfix.adapters.node import Node
+from firstfix.adapters.node import MakeNode, Node
 from firstfix.adapters.ros_names import Names
 from firstfix.adapters.topics import PARTICLES, Heard, Topic, heard_topics, said_topics
 from firstfix.adapters.transport import Gravity
@@ -129,7 +129,7 @@ class Dds:
                 self._node.complain(f"mismatch of {end.name}", f"{end.name}: {mismatch}")
 
 
-def run(config: NodeConfig, names: Names) -> None:
+def run(config: NodeConfig, names: Names, make_node: MakeNode = Node) -> None:
     """Run the node until it is interrupted or told to end.
 
     Parameters
@@ -138,6 +138,8 @@ def run(config: NodeConfig, names: Names) -> None:
         Settings.
     names : Names
         The place of the node among the names of the robot.
+    make_node : MakeNode
+        Makes the node.
 
     Raises
     ------
@@ -148,7 +150,7 @@ def run(config: NodeConfig, names: Names) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: is_over.set())
     transport = Dds(config, names, domain_settings())
-    node = Node(config, transport)
+    node = make_node(config, transport)
     node.start()
     transport.connect(node)
     is_over.wait()

@@ -195,3 +195,6 @@ class Node:
                 self.complain(heard.value, text)
         # A map is told once; what is wrong with odometry, every scan tells.
         self._heard &= {Heard.MAP}
+
+
+MakeNode = Callable[[NodeConfig, Transport], Node]

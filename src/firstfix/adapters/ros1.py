@@ -10,7 +10,7 @@ import nav_msgs.srv
 import rospy
 from rospy.numpy_msg import numpy_msg
 
-from firstfix.adapters.node import Node
+from firstfix.adapters.node import MakeNode, Node
 from firstfix.adapters.parameters import configured, flattened
 from firstfix.adapters.ros1_master import is_forgotten, register_anew
 from firstfix.adapters.ros1_types import Empty, decoded, make, message_class
@@ -79,13 +79,15 @@ class Ros1:
         _LOG[gravity]("%s", text)
 
 
-def run(arguments: list[str]) -> None:
+def run(arguments: list[str], make_node: MakeNode = Node) -> None:
     """Run the node until ROS ends it.
 
     Parameters
     ----------
     arguments : list of str
         Of ROS: ``topic:=other``, ``_parameter:=value``, ``__name:=name``.
+    make_node : MakeNode
+        Makes the node.
 
     Raises
     ------
@@ -97,7 +99,7 @@ def run(arguments: list[str]) -> None:
     values = flattened(rospy.get_param("~", {}))
     uses_topic = _switch("use_map_topic", values.pop("use_map_topic", True))
     config = configured(values)
-    node = Node(config, Ros1(config))
+    node = make_node(config, Ros1(config))
     node.start()
     heard = heard_topics(config)
     if not uses_topic and heard.pop(Heard.MAP, None) is not None:

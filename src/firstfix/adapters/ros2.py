@@ -11,7 +11,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.utilities import remove_ros_args
 
-from firstfix.adapters.node import Node
+from firstfix.adapters.node import MakeNode, Node
 from firstfix.adapters.parameters import Parameter, configured, parameters
 from firstfix.adapters.ros2_transport import Ros2
 from firstfix.adapters.ros2_types import described
@@ -21,10 +21,17 @@ AUTOSTART = "autostart"
 
 
 class Ros2Node(LifecycleNode):
-    """The node: parameters are read when it is configured; it hears and speaks while active."""
+    """The node: parameters are read when it is configured; it hears and speaks while active.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    make_node : MakeNode
+        Makes what thinks.
+    """
+
+    def __init__(self, make_node: MakeNode = Node) -> None:
         super().__init__("firstfix")
+        self._make_node = make_node
         self._transport: Ros2 | None = None
         for parameter in parameters():
             self._declare(parameter)
@@ -39,7 +46,7 @@ class Ros2Node(LifecycleNode):
             names = [parameter.name for parameter in parameters()]
             config = configured({name: self.get_parameter(name).value for name in names})
             self._transport = Ros2(self, config)
-            self._transport.start(Node(config, self._transport))
+            self._transport.start(self._make_node(config, self._transport))
         except InputError as error:
             self.end()
             self.get_logger().error(" ".join(str(error).split()))
@@ -101,13 +108,17 @@ class Ros2Node(LifecycleNode):
                     self.get_logger().warning(str(error))
 
 
-def run(arguments: list[str]) -> None:
+def run(arguments: list[str], make_node: MakeNode = Node) -> None:
     """Run the node until ROS ends it.
 
     Parameters
     ----------
     arguments : list of str
         Of ROS: ``--ros-args -r topic:=other -p parameter:=value``.
+    make_node : MakeNode
+        Makes what thinks.
+    make_node : MakeNode
+        Makes what thinks.
 
     Raises
     ------
@@ -115,7 +126,7 @@ def run(arguments: list[str]) -> None:
         If an argument is not one of ROS.
     """
     _initialise(["firstfix", *arguments])
-    node = Ros2Node()
+    node = Ros2Node(make_node)
     try:
         is_alone = node.get_parameter(AUTOSTART).value is True
         if is_alone and node.trigger_configure() == TransitionCallbackReturn.SUCCESS:

@@ -1,10 +1,9 @@
-"""A simulated robot that people steer, and its life in real time."""
+"""A simulated robot that people steer."""
 
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 
 from firstfix.core.errors import InputError
@@ -12,7 +11,7 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.sim.phases import CarryTo, DriveTo, Manner, Stand
 from firstfix.sim.scenario import Scenario, check_room, set_stage
-from firstfix.sim.stage import PERIOD_S, Moment
+from firstfix.sim.stage import Moment
 
 MOST_PEOPLE = 30
 
@@ -129,39 +128,3 @@ class SimRobot:
     def _be_carried(self, T_map_base: SE2) -> Iterator[Moment]:
         yield from CarryTo(T_map_base, _CARRY_S).play(self._stage)
         yield from Stand(_REST_S).play(self._stage)
-
-
-class RealTime:
-    """Lets a simulated robot live as fast as the clock on the wall.
-
-    Parameters
-    ----------
-    robot : SimRobot
-        Who lives.
-    tell : callable
-        Takes each moment, in the robot's thread.
-    """
-
-    def __init__(self, robot: SimRobot, tell: Callable[[Moment], None]) -> None:
-        self._robot = robot
-        self._tell = tell
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._live, name="robot", daemon=True)
-
-    def start(self) -> None:
-        """Begin to live."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """End after the present moment."""
-        self._over.set()
-        self._thread.join()
-
-    def _live(self) -> None:
-        due = time.monotonic()
-        while not self._over.wait(due - time.monotonic()):
-            moment = self._robot.step()
-            if moment is not None:
-                self._tell(moment)
-            # A machine that was asleep does not run after what it missed.
-            due = max(due + PERIOD_S, time.monotonic())

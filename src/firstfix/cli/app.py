@@ -19,7 +19,7 @@ from firstfix.cli.demo import demo
 from firstfix.cli.doctor import doctor
 from firstfix.cli.locate import locate
 from firstfix.cli.map import map_app
-from firstfix.cli.nodes import PASSED_ON, dds, ros1, ros2
+from firstfix.cli.nodes import AFTER_DASHES, PASSED_ON, dds, ros1, ros2
 from firstfix.cli.serve import serve
 from firstfix.cli.track import track
 from firstfix.core.errors import FirstfixError
@@ -40,7 +40,7 @@ app.command()(track)
 app.command()(bench)
 app.add_typer(map_app, name="map")
 app.command()(demo)
-app.command()(serve)
+app.command(context_settings=AFTER_DASHES)(serve)
 app.command(context_settings=PASSED_ON)(ros1)
 app.command(context_settings=PASSED_ON)(ros2)
 app.command()(dds)

@@ -3,16 +3,36 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
+from itertools import zip_longest
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from firstfix.core.errors import InputError
 
+if TYPE_CHECKING:
+    from firstfix.adapters.node import MakeNode
+    from firstfix.adapters.ros_names import Names
+    from firstfix.system.node_config import NodeConfig
+
+# What each node needs, and how to come by it.
+_VENV = "run firstfix in an environment made by `/usr/bin/python3 -m venv --system-site-packages`"
+_NEEDED = {
+    "ros1": ("rospy", f"source ROS's setup.bash, or {_VENV}"),
+    "ros2": (
+        "rclpy",
+        f"source /opt/ros/$ROS_DISTRO/setup.bash, and {_VENV}; or try `firstfix dds`",
+    ),
+    "dds": ("cyclonedds", "pip install 'firstfix[dds]'"),
+}
+
 # Whatever follows is for ROS.
 PASSED_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
+# The same, where it stands after ``--``.
+AFTER_DASHES = {"allow_extra_args": True}
 
 
 def ros1(context: typer.Context) -> None:
@@ -20,13 +40,7 @@ def ros1(context: typer.Context) -> None:
 
     Arguments are those of rosrun: `scan:=base_scan _mode:=full _base_frame_id:=base_link`.
     """
-    adapter = _load(
-        "ros1",
-        "rospy",
-        "source ROS's setup.bash, or run firstfix in an environment "
-        "made by `/usr/bin/python3 -m venv --system-site-packages`",
-    )
-    adapter.run(context.args)
+    _load("ros1").run(context.args)
 
 
 def ros2(context: typer.Context) -> None:
@@ -35,13 +49,7 @@ def ros2(context: typer.Context) -> None:
     Arguments are those of `ros2 run`: `--ros-args -r scan:=base_scan -p mode:=full
     -p autostart:=true`.
     """
-    adapter = _load(
-        "ros2",
-        "rclpy",
-        "source /opt/ros/$ROS_DISTRO/setup.bash, and run firstfix in an environment "
-        "made by `/usr/bin/python3 -m venv --system-site-packages`; or try `firstfix dds`",
-    )
-    adapter.run(context.args)
+    _load("ros2").run(context.args)
 
 
 def dds(
@@ -76,7 +84,7 @@ def dds(
     The variables of ROS 2 count: `ROS_DOMAIN_ID`, `ROS_DISTRO`, `ROS_LOCALHOST_ONLY`,
     `ROS_AUTOMATIC_DISCOVERY_RANGE`, `ROS_STATIC_PEERS`; and `CYCLONEDDS_URI`.
     """
-    adapter = _load("dds", "cyclonedds", "pip install 'firstfix[dds]'")
+    adapter = _load("dds")
     from firstfix.adapters.ros_arguments import names_from, settings_from
 
     names = names_from(remap or [], name, namespace)
@@ -92,7 +100,64 @@ def dds(
     adapter.run(config, names)
 
 
-def _load(name: str, library: str, remedy: str) -> ModuleType:
+def runner(robot: str) -> Callable[[str, list[str], MakeNode], None]:
+    """Return what runs a node on a map, with arguments of its ROS, until it ends.
+
+    Parameters
+    ----------
+    robot : str
+        ros1, ros2 or dds.
+
+    Returns
+    -------
+    callable
+        Takes the path of the map, the arguments, and what makes the node.
+
+    Raises
+    ------
+    InputError
+        If that kind of ROS is not here.
+    """
+    adapter = _load(robot)
+
+    def run(map_file: str, arguments: list[str], make_node: MakeNode) -> None:
+        if robot == "ros1":
+            adapter.run([*arguments, f"_yaml_filename:={map_file}"], make_node)
+        elif robot == "ros2":
+            adapter.run([*arguments, "--ros-args", "-p", f"yaml_filename:={map_file}"], make_node)
+        else:
+            adapter.run(*_settings_of(arguments, map_file), make_node)
+
+    return run
+
+
+def _settings_of(arguments: list[str], map_file: str) -> tuple[NodeConfig, Names]:
+    """Read what follows ``--ros-args`` where no ROS reads it."""
+    from firstfix.adapters.ros_arguments import names_from, settings_from
+
+    told: dict[str, list[str]] = {"-r": [], "-p": [], "--params-file": []}
+    rest = [argument for argument in arguments if argument != "--ros-args"]
+    for flag, value in zip_longest(rest[::2], rest[1::2]):
+        if flag not in told or value is None:
+            raise InputError(
+                expected="arguments like -r scan:=front/scan -p mode:=full",
+                received=f"{flag}",
+                remedy=f"write {', '.join(told)}, each with a value",
+            )
+        told[flag].append(value)
+    names = names_from(told["-r"], "firstfix", "/")
+    config = settings_from(
+        node=names.node,
+        amcl_file=None,
+        files=[Path(file) for file in told["--params-file"]],
+        assignments=told["-p"],
+        options={"yaml_filename": map_file},
+    )
+    return config, names
+
+
+def _load(name: str) -> ModuleType:
+    library, remedy = _NEEDED[name]
     try:
         return importlib.import_module(f"firstfix.adapters.{name}")
     except ModuleNotFoundError as error:

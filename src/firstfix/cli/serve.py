@@ -2,57 +2,60 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
+from firstfix.cli.live import Address, serve_robot, serve_simulated
 from firstfix.cli.worlds import world_or_map
-
-if TYPE_CHECKING:
-    from firstfix.core.grid import OccupancyGrid
+from firstfix.core.errors import InputError
 
 PORT = 8642
 
 
+class Transport(Enum):
+    """Which robot is served."""
+
+    SIM = "sim"
+    ROS1 = "ros1"
+    ROS2 = "ros2"
+    DDS = "dds"
+
+
 def serve(
-    map_: Annotated[str, typer.Argument(metavar="MAP", help="The map's YAML.")],
-    port: Annotated[int, typer.Option(help="0: any that is free.", min=0, max=65535)] = PORT,
+    context: typer.Context,
+    map_: Annotated[
+        str, typer.Argument(metavar="MAP", help="The map's YAML; for `sim` also a built-in world.")
+    ],
+    robot: Annotated[Transport, typer.Option(help="Which robot is in it.")] = Transport.SIM,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; others than loopback need a token.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="0: any that is free.")] = PORT,
+    token: Annotated[
+        str | None,
+        typer.Option(envvar="FIRSTFIX_TOKEN", help="What viewers and programs must know."),
+    ] = None,
+    read_only: Annotated[
+        bool, typer.Option("--read-only", help="Let people watch and ask, not steer.")
+    ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Of the simulated robot.")] = 1,
 ) -> None:
-    """Show where a robot is, and why, on a page; answer programs that ask where they are."""
-    play_live(world_or_map(map_), map_, seed, port)
+    """Show on a page where a robot is, and why; answer programs that ask where they are.
 
-
-def play_live(grid: OccupancyGrid, name: str, seed: int, port: int) -> None:
-    """Serve the page of a simulated robot until somebody ends it."""
-    import socket
-
-    from firstfix.adapters.node import Node
-    from firstfix.adapters.quiet import Quiet
-    from firstfix.adapters.sim_robot import RealTime, SimRobot
-    from firstfix.adapters.web.feed import Feed
-    from firstfix.adapters.web.server import Page, make_app
-    from firstfix.adapters.web.server import serve as run
-    from firstfix.adapters.web.steering import Steering
-    from firstfix.sim.stage import Moment
-    from firstfix.system.inputs import NewMap
-    from firstfix.system.node_config import Mode, NodeConfig
-
-    listening = socket.create_server(("127.0.0.1", port))
-    feed = Feed(name)
-    node = Node(NodeConfig(mode=Mode.FULL), Quiet(lambda text: feed.tell("warning", text)), [feed])
-    robot = SimRobot(grid, seed)
-
-    def tell(moment: Moment) -> None:
-        feed.know(moment.T_map_base)
-        for event in moment.events:
-            node.give(event)
-
-    node.give(NewMap(0.0, grid))
-    node.start()
-    living = RealTime(robot, tell)
-    living.start()
-    typer.echo(f"Live page  http://127.0.0.1:{listening.getsockname()[1]}/  (Ctrl-C ends)")
-    run(make_app(Page("sim", feed, Steering(feed, node.give, robot))), listening)
-    living.stop()
-    node.stop()
+    `docs/live.md` has the API. What follows `--` goes to ROS: `firstfix serve map.yaml --robot
+    ros1 -- scan:=base_scan`.
+    """
+    address = Address(host, port, token, may_steer=not read_only)
+    if robot is Transport.SIM:
+        if context.args:
+            raise InputError(
+                expected="a map, and options",
+                received=f"also {context.args[0]}",
+                remedy="arguments of ROS go with --robot ros1, ros2 or dds",
+            )
+        serve_simulated(world_or_map(map_), Path(map_).stem, seed, address)
+    else:
+        serve_robot(robot.value, Path(map_), context.args, address)

@@ -103,7 +103,7 @@ def classes_of_beams(
         `EXPLAINED`, `SHORT`, `THROUGH` or `UNKNOWN`.
     """
     _, _, classes = _compared(pose[None], beams, fields)
-    return classes[0]
+    return classes.reshape(-1)
 
 
 def _compared(

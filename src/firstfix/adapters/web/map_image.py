@@ -23,7 +23,7 @@ _KEPT = 4
 
 def cells_per_pixel(shown: ShownMap, most_pixels: int) -> int:
     """Return how many cells a side share a pixel where the picture may have so many a side."""
-    return math.ceil(max(shown.grid.cells.shape) / most_pixels)
+    return math.ceil(max(shown.grid.width, shown.grid.height) / most_pixels)
 
 
 def image_of(shown: ShownMap, most_pixels: int = MOST_PIXELS) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from firstfix.adapters.web.strict_json import shown
 from firstfix.core.errors import InputError
 
 # Farther than any building, and well within what cells can be counted by.
@@ -32,6 +33,17 @@ class Entry:
     least: float = -FARTHEST_M
     most: float = FARTHEST_M
 
+    def schema(self) -> dict[str, Any]:
+        """Describe it in JSON Schema."""
+        if self.kind is bool:
+            return {"type": "boolean", "description": self.description}
+        return {
+            "type": "integer" if self.kind is int else "number",
+            "description": self.description,
+            "minimum": self.least,
+            "maximum": self.most,
+        }
+
     def checked(self, name: str, value: Any) -> Any:
         """Return a value as it shall be.
 
@@ -51,7 +63,7 @@ class Entry:
         limits = "" if self.kind is bool else f" from {self.least:g} to {self.most:g}"
         raise InputError(
             expected=f"{name} as {words}{limits}",
-            received=f"{value!r:.60}",
+            received=shown(value),
             remedy=f"{name} is {self.description}",
         )
 
@@ -111,7 +123,7 @@ def order_of(message: Any) -> Order:
     if not isinstance(kind, str) or kind not in ORDERS:
         raise InputError(
             expected=f"an object whose type is one of {', '.join(ORDERS)}",
-            received=f"{message!r:.60}",
+            received=shown(message),
             remedy="see docs/live.md",
         )
     return Order(kind, checked(ORDERS[kind], message))
@@ -139,7 +151,7 @@ def checked(entries: Mapping[str, Entry], message: Any) -> dict[str, Any]:
     """
     if not isinstance(message, Mapping):
         raise InputError(
-            expected="a JSON object", received=f"{message!r:.60}", remedy="see docs/live.md"
+            expected="a JSON object", received=shown(message), remedy="see docs/live.md"
         )
     for name in entries:
         if name not in message:

@@ -1,106 +1,145 @@
-"""The server: routes, and uvicorn under them."""
+"""The server: what is served where, and uvicorn under it."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.responses import FileResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
-from firstfix.adapters.web.feed import Feed
-from firstfix.adapters.web.frames import as_text, hello_object, map_object, state_object
-from firstfix.adapters.web.live import Hub, live
-from firstfix.adapters.web.map_image import MOST_PIXELS, MapPictures
-from firstfix.adapters.web.steering import Steering
+from firstfix.adapters.web.api import Api
+from firstfix.adapters.web.guard import Guard
+from firstfix.adapters.web.hub import Hub
+from firstfix.adapters.web.live import live
+from firstfix.adapters.web.page import Page
+from firstfix.adapters.web.problem import HANDLERS
+from firstfix.core.errors import InputError
 
 STATIC = Path(__file__).parent / "static"
 
-
-@dataclass(frozen=True, eq=False)
-class Page:
-    """The page and the API of one robot."""
-
-    robot: str
-    feed: Feed
-    steering: Steering
-    may_steer: bool = True
-    pictures: MapPictures = field(default_factory=MapPictures)
-
-    def hello(self) -> str:
-        return as_text(
-            hello_object(
-                self.robot,
-                self.steering.abilities,
-                self.feed.map,
-                self.feed.events(),
-                may_steer=self.may_steer,
-            )
-        )
+# Connections at once: twenty viewers, what else they fetch, and some programs.
+_MOST_CONNECTIONS = 128
+# An order is short.
+_MESSAGE_BYTES = 16 * 1024
+_LAST_WORDS_S = 2
+# A viewer who takes nothing for so long is gone, whatever its network still says.
+_SILENT_MS = 60_000
 
 
-def make_app(page: Page) -> Starlette:
+def make_app(page: Page) -> ASGIApp:
+    """Put a page together.
+
+    Parameters
+    ----------
+    page : Page
+        What it is about.
+
+    Returns
+    -------
+    ASGI application
+        For `run`, or another server.
+    """
     hub = Hub(page.feed, page.hello)
 
-    @asynccontextmanager
+    @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        task = asyncio.create_task(hub.run())
+        showing = asyncio.create_task(hub.run())
         yield
-        task.cancel()
-        with suppress(asyncio.CancelledError):
-            await task
+        showing.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await showing
 
     async def index(_: Request) -> Response:
-        return FileResponse(STATIC / "index.html")
+        return FileResponse(STATIC / "index.html", headers={"cache-control": "no-cache"})
 
-    async def status(_: Request) -> Response:
-        return Response(
-            as_text(state_object(page.feed.view, len(hub))), media_type="application/json"
-        )
+    async def watch(websocket: WebSocket) -> None:
+        await live(websocket, hub, page)
 
-    async def map_(_: Request) -> Response:
-        return JSONResponse(map_object(page.feed.map))
-
-    async def map_png(request: Request) -> Response:
-        png = await run_in_threadpool(page.pictures.png, page.feed.map, MOST_PIXELS)
-        return Response(png, media_type="image/png")
-
-    async def live_(socket: WebSocket) -> None:
-        await socket.accept()
-        await live(socket, hub, page.steering if page.may_steer else None)
-
-    return Starlette(
-        routes=[
-            Route("/", index),
-            Route("/v1/status", status),
-            Route("/v1/map", map_),
-            Route("/v1/map.png", map_png),
-            WebSocketRoute("/v1/live", live_),
-            Mount("/static", StaticFiles(directory=STATIC)),
-        ],
-        lifespan=lifespan,
-    )
+    routes = [
+        Route("/", index),
+        *Api(page, hub).routes(),
+        WebSocketRoute("/v1/live", watch),
+        Mount("/static", StaticFiles(directory=STATIC)),
+    ]
+    app = Starlette(routes=routes, lifespan=lifespan, exception_handlers=HANDLERS)
+    return Guard(app, page.access)
 
 
-def serve(app: Starlette, listening: socket.socket) -> None:
+def listen(host: str, port: int) -> socket.socket:
+    """Open the port of the server, before anything else is begun.
+
+    Parameters
+    ----------
+    host : str
+        Name or address of this machine, as others shall reach it.
+    port : int
+        0 for any that is free.
+
+    Returns
+    -------
+    socket
+        Listening.
+
+    Raises
+    ------
+    InputError
+        If that cannot be.
+    """
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        listening = socket.create_server(address[:2], family=family)
+    except OSError as error:
+        raise InputError(
+            expected=f"a free port {port} on {host}",
+            received=f"{error.strerror or error}",
+            remedy="choose another --port, or end what listens there",
+        ) from error
+    if hasattr(socket, "TCP_USER_TIMEOUT"):
+        listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _SILENT_MS)
+    return listening
+
+
+def url_of(listening: socket.socket) -> str:
+    """Return where a browser finds the page."""
+    host, port = listening.getsockname()[:2]
+    return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
+
+
+def make_server(page: Page) -> uvicorn.Server:
+    """Make a server of a page.
+
+    Parameters
+    ----------
+    page : Page
+        What is served.
+
+    Returns
+    -------
+    uvicorn.Server
+        ``run(sockets=[listening])`` serves until a signal, or until ``should_exit`` is set.
+    """
     config = uvicorn.Config(
-        app,
-        log_level="warning",
+        make_app(page),
+        # Not every request: what was asked for is nobody's business.
         access_log=False,
-        ws="websockets-sansio",
-        ws_per_message_deflate=False,
-        ws_max_size=16 * 1024,
-        timeout_graceful_shutdown=2,
+        log_level="warning",
+        http="h11",
+        limit_concurrency=_MOST_CONNECTIONS,
         server_header=False,
+        timeout_graceful_shutdown=_LAST_WORDS_S,
+        ws="websockets-sansio",
+        ws_max_size=_MESSAGE_BYTES,
+        # Floats do not get shorter, and each viewer would cost as much again.
+        ws_per_message_deflate=False,
     )
-    uvicorn.Server(config).run(sockets=[listening])
+    return uvicorn.Server(config)

@@ -61,6 +61,8 @@ class View:
 
     Parameters
     ----------
+    map : ShownMap or None
+        The map in use.
     stamp : float
         Time of the newest input that led to something, s.
     state : State
@@ -91,6 +93,7 @@ class View:
         True while its clock stands still.
     """
 
+    map: ShownMap | None = None
     stamp: float = 0.0
     state: State = State.NO_MAP
     reason: str = "no map yet"

@@ -1,0 +1,75 @@
+"""What the page and the API of one robot are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from starlette.exceptions import HTTPException
+
+from firstfix.adapters.web.feed import Feed
+from firstfix.adapters.web.guard import Access
+from firstfix.adapters.web.map_image import MapPictures
+from firstfix.adapters.web.messages import as_text, hello_object
+from firstfix.adapters.web.steering import Steering
+from firstfix.adapters.web.view import ShownMap
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Page:
+    """The page and the API of one robot.
+
+    Parameters
+    ----------
+    robot : str
+        sim, ros1, ros2 or dds.
+    feed : Feed
+        What there is to be seen.
+    steering : Steering
+        Carries out what people want.
+    access : Access
+        What is asked of clients.
+    pictures : MapPictures
+        Of maps.
+    """
+
+    robot: str
+    feed: Feed
+    steering: Steering
+    access: Access = field(default_factory=Access)
+    pictures: MapPictures = field(default_factory=MapPictures)
+
+    def hello(self) -> str:
+        """Write the message that a viewer gets first."""
+        message: dict[str, Any] = hello_object(
+            self.robot,
+            self.steering.abilities,
+            self.feed.view.map,
+            self.feed.events(),
+            may_steer=self.access.may_steer,
+        )
+        return as_text(message)
+
+    def map(self) -> ShownMap:
+        """Return the map in use.
+
+        Raises
+        ------
+        HTTPException
+            503 if there is none yet.
+        """
+        shown = self.feed.view.map
+        if shown is None:
+            raise HTTPException(503, "there is no map yet", {"retry-after": "1"})
+        return shown
+
+    def check_may_steer(self) -> None:
+        """Refuse those who may only watch.
+
+        Raises
+        ------
+        HTTPException
+            403 if that is so.
+        """
+        if not self.access.may_steer:
+            raise HTTPException(403, "the server was started with --read-only")

@@ -1,0 +1,158 @@
+"""The live page, served until somebody ends it."""
+
+from __future__ import annotations
+
+import os
+import sys
+import webbrowser
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from firstfix.core.errors import InputError
+
+if TYPE_CHECKING:
+    import socket
+
+    from firstfix.adapters.web.guard import Access
+    from firstfix.core.grid import OccupancyGrid
+
+# What can be guessed is no token.
+SHORTEST_TOKEN = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """Where the page is, and who may see it.
+
+    Parameters
+    ----------
+    host : str
+        Name or address to listen on.
+    port : int
+        0 for any that is free.
+    token : str or None
+        What viewers must know.
+    may_steer : bool
+        False if they may only watch.
+    """
+
+    host: str
+    port: int
+    token: str | None = None
+    may_steer: bool = True
+
+    def access(self) -> Access:
+        """Return what is asked of clients.
+
+        Raises
+        ------
+        InputError
+            If the token is missing or too short.
+        """
+        from firstfix.adapters.web.guard import Access, is_loopback
+
+        inside = is_loopback(self.host)
+        if self.token is None and not inside:
+            raise InputError(
+                expected=f"a --token, because {self.host} can be reached by other machines",
+                received="none",
+                remedy="choose one, or leave --host out",
+            )
+        if self.token is not None and len(self.token) < SHORTEST_TOKEN:
+            raise InputError(
+                expected=f"a token of at least {SHORTEST_TOKEN} characters",
+                received=f"{len(self.token)}",
+                remedy="make it longer; only programs and links need to remember it",
+            )
+        return Access(self.token, may_steer=self.may_steer, loopback_only=inside)
+
+
+def serve_simulated(grid: OccupancyGrid, name: str, seed: int, address: Address) -> None:
+    """Serve the page of a simulated robot until it is interrupted.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The building, and the map of it.
+    name : str
+        What it is called.
+    seed : int
+        Where chance begins.
+    address : Address
+        Where the page is.
+
+    Raises
+    ------
+    InputError
+        If it cannot be served there.
+    """
+    from firstfix.adapters.sim_node import SimNode
+    from firstfix.adapters.sim_robot import SimRobot
+    from firstfix.adapters.web.feed import Feed
+    from firstfix.adapters.web.page import Page
+    from firstfix.adapters.web.server import listen, make_server
+    from firstfix.adapters.web.steering import Steering
+
+    access = address.access()
+    with listen(address.host, address.port) as listening:
+        feed = Feed(name)
+
+        def complain(text: str) -> None:
+            typer.echo(text, err=True)
+            feed.tell("warning", text.partition("\n")[0])
+
+        robot = SimRobot(grid, seed)
+        node = SimNode(grid, robot, [feed], feed.know, complain)
+        page = Page("sim", feed, Steering(feed, node.give, robot), access)
+        node.start()
+        _tell(listening, access)
+        make_server(page).run(sockets=[listening])
+        node.stop()
+
+
+def serve_robot(robot: str, map_path: Path, arguments: list[str], address: Address) -> None:
+    """Run the node of a robot until it ends, and serve its page.
+
+    Parameters
+    ----------
+    robot : str
+        ros1, ros2 or dds.
+    map_path : Path
+        The map's YAML.
+    arguments : list of str
+        Of ROS.
+    address : Address
+        Where the page is.
+
+    Raises
+    ------
+    InputError
+        If the map or an argument cannot be used, or the page cannot be served there.
+    """
+    from firstfix.adapters.web.beside import PageBeside
+    from firstfix.adapters.web.server import listen
+    from firstfix.cli.nodes import runner
+    from firstfix.formats.map_server import load_map
+
+    access, run = address.access(), runner(robot)
+    load_map(map_path)  # what is wrong with it is told before anything is begun
+    with listen(address.host, address.port) as listening:
+        _tell(listening, access)
+        with PageBeside(robot, map_path.stem, access, listening) as page:
+            run(f"{map_path.resolve()}", arguments, page.make_node)
+
+
+def _tell(listening: socket.socket, access: Access) -> None:
+    """Say where the page is, and show it where somebody is there to look at it."""
+    from firstfix.adapters.web.server import url_of
+
+    url = url_of(listening) + ("" if access.token is None else f"#token={access.token}")
+    typer.echo(f"Live page  {url}  (Ctrl-C ends)")
+    has_display = sys.platform in {"darwin", "win32"} or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
+    if has_display and sys.stdout.isatty():
+        webbrowser.open(url)
