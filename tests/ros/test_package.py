@@ -1,0 +1,163 @@
+"""The wheel as a package of ROS: marker, package.xml, launch files, parameters, scripts."""
+
+import importlib.util
+import stat
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+import zipfile
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import pytest
+import yaml
+
+from firstfix import __version__
+from firstfix.adapters.parameters import configured, flattened, parameters
+from firstfix.system.node_config import NodeConfig
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    tomllib = None
+
+ROOT = Path(__file__).parents[2]
+ROS = ROOT / "ros"
+
+
+def load(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location("loaded", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def shared_data() -> dict[str, str]:
+    if tomllib is None:
+        pytest.skip("tomllib came with Python 3.11")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    return project["tool"]["hatch"]["build"]["targets"]["wheel"]["shared-data"]
+
+
+def test_all_that_is_shared_is_there_and_nothing_else() -> None:
+    ours = {str(path.relative_to(ROOT)) for path in ROS.rglob("*") if path.is_file()}
+    ours = {name for name in ours if "__pycache__" not in name}
+    assert ours - set(shared_data()) == {"ros/COLCON_IGNORE", "ros/make_config.py"}
+    assert set(shared_data()) <= ours
+
+
+def test_ros_looks_where_things_are() -> None:
+    goals = shared_data()
+    assert goals["ros/resource/firstfix"] == "share/ament_index/resource_index/packages/firstfix"
+    assert goals["ros/package.xml"] == "share/firstfix/package.xml"
+    assert goals["ros/firstfix_node"] == "lib/firstfix/firstfix_node"
+    assert goals["ros/launch/firstfix.launch.py"].startswith("share/firstfix/launch/")
+    # As the launch file looks for it.
+    assert goals["ros/config/firstfix.yaml"] == "share/firstfix/config/firstfix.yaml"
+
+
+def test_the_package_is_this_one() -> None:
+    package = ET.parse(ROS / "package.xml").getroot()  # noqa: S314 - our own file
+    assert package.get("format") == "3"
+    assert package.findtext("name") == "firstfix"
+    assert package.findtext("version") == __version__
+    conditions = {d.text: d.get("condition") for d in package.findall("exec_depend")}
+    assert conditions["rclpy"] == "$ROS_VERSION == 2"
+    assert conditions["rospy"] == "$ROS_VERSION == 1"
+    assert conditions["sensor_msgs"] is None
+
+
+def test_the_file_of_parameters_is_as_written_by_the_script() -> None:
+    make_config = load(ROS / "make_config.py")
+    assert make_config.FILE.read_text() == make_config.text(), "run python ros/make_config.py"
+
+
+def test_the_file_of_parameters_has_all_of_them_with_their_defaults() -> None:
+    written = yaml.safe_load((ROS / "config" / "firstfix.yaml").read_text())
+    values = flattened(written["/**"]["ros__parameters"])
+    assert values.pop("use_sim_time") is False
+    assert values == {parameter.name: parameter.default for parameter in parameters()}
+    assert {name: type(value) for name, value in values.items()} == {
+        parameter.name: type(parameter.default) for parameter in parameters()
+    }
+    assert configured(values) == NodeConfig()
+
+
+@pytest.fixture
+def launch_file(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Load the launch file; launch can be had as little as rclpy, and is played by dictionaries."""
+    names = ("launch", "launch.actions", "launch.substitutions", "launch_ros", "launch_ros.actions")
+    for name in names:
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+    sys.modules["launch"].LaunchDescription = list
+    actions = sys.modules["launch.actions"]
+    actions.DeclareLaunchArgument = lambda name, default_value, description: (name, default_value)
+    actions.OpaqueFunction = lambda function: function
+    sys.modules["launch.substitutions"].LaunchConfiguration = lambda name: SimpleNamespace(
+        perform=lambda context: context[name]
+    )
+    sys.modules["launch_ros.actions"].Node = lambda **given: given
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    return load(ROS / "launch" / "firstfix.launch.py")
+
+
+def launched(launch_file: ModuleType, **asked: str) -> dict:
+    *declared, start = launch_file.generate_launch_description()
+    (node,) = start(dict(declared) | asked)
+    return node
+
+
+def test_launched_without_arguments_it_starts_itself(launch_file: ModuleType) -> None:
+    node = launched(launch_file)
+    assert (node["package"], node["executable"]) == ("firstfix", "firstfix_node")
+    assert node["name"] == "firstfix"
+    file, asked = node["parameters"]
+    assert Path(file) == ROS / "config" / "firstfix.yaml"
+    assert asked == {"use_sim_time": False, "autostart": True}
+
+
+def test_launched_with_arguments_it_passes_on_what_was_asked(launch_file: ModuleType) -> None:
+    given = {"mode": "full", "map": "map.yaml", "use_sim_time": "True", "autostart": "false"}
+    node = launched(launch_file, namespace="robot1", **given)
+    asked = node["parameters"][1]
+    assert asked.pop("use_sim_time") is True
+    assert asked.pop("autostart") is False
+    config = configured(asked)
+    assert config.mode.value == "full"
+    assert config.yaml_filename == str(Path("map.yaml").absolute())
+    assert node["namespace"] == "robot1"
+
+
+def test_the_script_starts_the_command_of_its_environment(tmp_path: Path) -> None:
+    command = tmp_path / "bin" / "firstfix"
+    script = tmp_path / "lib" / "firstfix" / "firstfix_node"
+    for file, text in (
+        (command, '#!/bin/sh\nprintf "%s|" "$@"\n'),
+        (script, (ROS / "firstfix_node").read_text()),
+    ):
+        file.parent.mkdir(parents=True)
+        file.write_text(text)
+        file.chmod(0o755)
+    link = tmp_path / "elsewhere"
+    link.symlink_to(script)
+    for path in (script, link):
+        arguments = ["--ros-args", "-p", "yaml_filename:=my map.yaml"]
+        ended = subprocess.run([path, *arguments], capture_output=True, text=True, check=True)
+        assert ended.stdout == "ros2|--ros-args|-p|yaml_filename:=my map.yaml|"
+
+
+@pytest.mark.slow
+def test_the_wheel_has_it_all_and_scripts_can_be_executed(tmp_path: Path) -> None:
+    pytest.importorskip("hatchling", reason="without hatchling no wheel can be built here")
+    quiet = ["--quiet", "--disable-pip-version-check"]
+    alone = ["--no-deps", "--no-build-isolation"]
+    command = [sys.executable, "-m", "pip", "wheel", *quiet, *alone, "--wheel-dir", tmp_path, ROOT]
+    subprocess.run(command, check=True)
+    (wheel,) = tmp_path.glob("firstfix-*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        modes = {entry.filename: entry.external_attr >> 16 for entry in archive.infolist()}
+    prefix = f"firstfix-{__version__}.data/data/"
+    for source, goal in shared_data().items():
+        is_executable = bool(modes[prefix + goal] & stat.S_IXUSR)
+        assert is_executable == bool((ROOT / source).stat().st_mode & stat.S_IXUSR)
+    assert modes[f"{prefix}lib/firstfix/firstfix_node"] & stat.S_IXUSR
