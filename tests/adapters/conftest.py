@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import os
+import sys
+from pathlib import Path
+from typing import Any
 
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "robots"))
+
+from recorder import Recorder
 
 REQUIRED = set(filter(None, os.environ.get("FIRSTFIX_REQUIRE", "").split(",")))
 
@@ -14,3 +21,9 @@ def missing(part: str, why: str) -> None:
     if part in REQUIRED:
         pytest.fail(f"FIRSTFIX_REQUIRE asks for {part}: {why}")
     pytest.skip(why)
+
+
+@pytest.fixture
+def recorder(ros2: Any) -> Recorder:
+    """Give a transport that keeps what is published, with messages of ROS 2."""
+    return Recorder(ros2)

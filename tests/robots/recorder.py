@@ -1,0 +1,104 @@
+"""A transport that keeps what is published, and a robot that speaks in messages."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from firstfix.adapters.topics import PARTICLES, Heard, Topic
+from firstfix.adapters.transport import Gravity
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.se2 import SE2
+from firstfix.formats.outgoing import laser_scan, occupancy_grid, transforms
+from firstfix.sim.lidar import Lidar
+
+ODOM, BASE, LASER = "odom", "base_footprint", "laser"
+T_BASE_LASER = SE2(0.1, 0.0, 0.0)
+
+
+class Recorder:
+    """Everything that was published, as it would arrive, and all lines of the log.
+
+    `wire` makes messages, and sends them to bytes and back. `listening` has the number of listeners
+    by the name of the topic.
+    """
+
+    def __init__(self, wire: Any, particles: Topic = PARTICLES) -> None:
+        self.wire = wire
+        self.particles = particles
+        self.listening: dict[str, int] = {}
+        self.published: list[tuple[Topic, Any]] = []
+        self.lines: list[tuple[Gravity, str]] = []
+        self.threads: set[str] = set()
+
+    def make(self, type_name: str, /, **fields: Any) -> Any:
+        return self.wire.make(type_name, **fields)
+
+    def publish(self, topic: Topic, message: Any) -> None:
+        self.threads.add(threading.current_thread().name)
+        kind = "/".join(message.__msgtype__.split("/msg/"))
+        assert kind == topic.type_name
+        self.published.append((topic, self.wire.sent(message)))
+
+    def listeners(self, topic: Topic) -> int:
+        return self.listening.get(topic.name, 0)
+
+    def log(self, gravity: Gravity, text: str) -> None:
+        self.lines.append((gravity, text))
+
+    def on(self, topic: Topic) -> list[Any]:
+        """Return the messages of a topic, in order."""
+        return [message for where, message in self.published if where is topic]
+
+    def told(self, gravity: Gravity) -> list[str]:
+        """Return the lines of the log that are that grave."""
+        return [text for how, text in self.lines if how is gravity]
+
+
+class Speaker:
+    """The messages of a robot that stands or drives in a drawn world."""
+
+    def __init__(self, wire: Any, world: OccupancyGrid, pose: SE2, stamp: float = 100.0) -> None:
+        self.wire = wire
+        self.world = world
+        self.pose = pose
+        self.stamp = stamp
+        self.T_odom_base = SE2(-3.0, 7.0, 2.0)
+        self._lidar = Lidar(beams=180, T_base_laser=T_BASE_LASER)
+        self._rng = np.random.default_rng(0)
+
+    def move(self, moved: SE2 | None = None, seconds: float = 0.1) -> None:
+        """Let time pass."""
+        self.stamp = round(self.stamp + seconds, 6)
+        self.pose = self.pose @ (moved or SE2.identity())
+        self.T_odom_base = self.T_odom_base @ (moved or SE2.identity())
+
+    def map(self, frame: str = "map") -> Any:
+        return self.wire.sent(occupancy_grid(self.wire.make, 1.0, frame, self.world))
+
+    def fixed(self) -> Any:
+        return self.wire.sent(transforms(self.wire.make, 0.0, BASE, LASER, T_BASE_LASER))
+
+    def tf(self) -> Any:
+        return self.wire.sent(transforms(self.wire.make, self.stamp, ODOM, BASE, self.T_odom_base))
+
+    def scan(self, frame: str = LASER) -> Any:
+        scan = self._lidar.scan(self.world, self.pose, self._rng, self.stamp)
+        return self.wire.sent(laser_scan(self.wire.make, frame, scan))
+
+    def report(self, hear: Callable[[Heard, Any], Any]) -> list[Any]:
+        """Tell odometry, then the scan at the same time; return what was answered."""
+        return [hear(Heard.TF, self.tf()), hear(Heard.SCAN, self.scan())]
+
+
+def wait_for(what: Callable[[], Any], seconds: float = 60.0) -> Any:
+    """Wait until something is so, and return it; on a busy machine that may take long."""
+    end = time.monotonic() + seconds
+    while not (found := what()):
+        assert time.monotonic() < end, "it has not happened"
+        time.sleep(0.01)
+    return found
