@@ -10,8 +10,9 @@ from firstfix.adapters.parameters import Parameter, parameters
 PAGE = Path(__file__).parent / "reference" / "settings.md"
 HEAD = """# Settings
 
-Of the nodes (`firstfix ros1`, `ros2`, `dds`), as private parameters; and of `firstfix track --params`,
-as far as they are those of AMCL. Written by `docs/make_settings.py` from the dataclasses that check them.
+Of the nodes (`firstfix ros1`, `ros2`, `dds`), as private parameters; and of `firstfix track
+--params`, as far as they are those of AMCL. Written by `docs/make_settings.py` from the dataclasses
+that check them.
 
 | name | default | range | meaning |
 |---|---|---|---|
