@@ -169,7 +169,7 @@ def test_the_demo_without_matplotlib_tells_its_story_all_the_same(
     cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    ended = cli("demo", "--world", "house", "--seed", 3)
+    ended = cli("demo", "--headless", "--world", "house", "--seed", 3)
     assert (ended.status, ended.err) == (0, "")
     assert "pip install 'firstfix[plot]'" in ended.out
     assert "found" in ended.out.splitlines()[-1]
@@ -177,7 +177,7 @@ def test_the_demo_without_matplotlib_tells_its_story_all_the_same(
 
 
 def test_the_demo_takes_a_map_of_ones_own(cli, unique: Files) -> None:
-    assert cli("demo", "--world", unique[0], "--plot", "own.svg").status in (0, 1)
+    assert cli("demo", "--headless", "--world", unique[0], "--plot", "own.svg").status in (0, 1)
     assert Path("own.svg").exists()
 
 

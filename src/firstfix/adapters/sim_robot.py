@@ -9,7 +9,7 @@ from contextlib import suppress
 from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.sim.phases import CarryTo, DriveTo, Manner, Stand
+from firstfix.sim.phases import CarryTo, DriveTo, Manner, Pause, Stand
 from firstfix.sim.scenario import Scenario, check_room, set_stage
 from firstfix.sim.stage import Moment
 
@@ -20,7 +20,7 @@ _CARRY_S = 4.0
 _REST_S = 3.0
 # Where it was sent it stays so long; then it wanders again.
 _PATIENCE_S = 15.0
-# Between two goals of its own, and before the first.
+# Between two goals of its own, and before the first; so long, too, do its sensors take to start.
 _BREAK_S = 2.0
 
 
@@ -42,7 +42,7 @@ class SimRobot:
         self._scenario = Scenario(())
         self._stage = set_stage(self._scenario, grid, seed)
         self._lock = threading.Lock()
-        self._plot: Iterator[Moment] = Stand(_BREAK_S).play(self._stage)
+        self._plot: Iterator[Moment] = self._wake()
         self.is_paused = False
 
     @property
@@ -119,6 +119,10 @@ class SimRobot:
                 remedy=f"wait until it stands again, at most {_CARRY_S:g} s",
             )
         check_room(self._stage.floor, place, self._scenario.kobuki.radius_m)
+
+    def _wake(self) -> Iterator[Moment]:
+        yield from Pause(_BREAK_S).play(self._stage)
+        yield from Stand(_BREAK_S).play(self._stage)
 
     def _drive(self, goal: SE2 | None, rest_s: float) -> Iterator[Moment]:
         with suppress(InputError):  # where it was put there may be no way out: it stays

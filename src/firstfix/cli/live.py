@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import sys
 import webbrowser
+from contextlib import suppress
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
 
     from firstfix.adapters.web.guard import Access
     from firstfix.core.grid import OccupancyGrid
+
+PORT = 8642
 
 # What can be guessed is no token.
 SHORTEST_TOKEN = 8
@@ -70,7 +74,16 @@ class Address:
         return Access(self.token, may_steer=self.may_steer, loopback_only=inside)
 
 
-def serve_simulated(grid: OccupancyGrid, name: str, seed: int, address: Address) -> None:
+class Rest(Enum):
+    """What a simulated robot does before anybody looks on."""
+
+    AWAKE = "awake"  # it lives
+    SLEEPS = "sleeps"  # nobody shall miss how it is found
+
+
+def serve_simulated(
+    grid: OccupancyGrid, name: str, seed: int, address: Address, rest: Rest
+) -> None:
     """Serve the page of a simulated robot until it is interrupted.
 
     Parameters
@@ -83,6 +96,8 @@ def serve_simulated(grid: OccupancyGrid, name: str, seed: int, address: Address)
         Where chance begins.
     address : Address
         Where the page is.
+    rest : Rest
+        What the robot does until the first viewer comes.
 
     Raises
     ------
@@ -105,11 +120,15 @@ def serve_simulated(grid: OccupancyGrid, name: str, seed: int, address: Address)
             feed.tell("warning", text.partition("\n")[0])
 
         robot = SimRobot(grid, seed)
+        if rest is Rest.SLEEPS:
+            robot.pause()
         node = SimNode(grid, robot, [feed], feed.know, complain)
-        page = Page("sim", feed, Steering(feed, node.give, robot), access)
+        steering = Steering(feed, node.give, robot)
+        page = Page("sim", feed, steering, access, greet=robot.go_on)
         node.start()
         _tell(listening, access)
-        make_server(page).run(sockets=[listening])
+        with suppress(KeyboardInterrupt):  # the usual end
+            make_server(page).run(sockets=[listening])
         node.stop()
 
 

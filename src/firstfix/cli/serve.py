@@ -8,11 +8,9 @@ from typing import Annotated
 
 import typer
 
-from firstfix.cli.live import Address, serve_robot, serve_simulated
+from firstfix.cli.live import PORT, Address, Rest, serve_robot, serve_simulated
 from firstfix.cli.worlds import world_or_map
 from firstfix.core.errors import InputError
-
-PORT = 8642
 
 
 class Transport(Enum):
@@ -56,6 +54,6 @@ def serve(
                 received=f"also {context.args[0]}",
                 remedy="arguments of ROS go with --robot ros1, ros2 or dds",
             )
-        serve_simulated(world_or_map(map_), Path(map_).stem, seed, address)
+        serve_simulated(world_or_map(map_), Path(map_).stem, seed, address, Rest.AWAKE)
     else:
         serve_robot(robot.value, Path(map_), context.args, address)

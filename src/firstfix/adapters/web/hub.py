@@ -64,11 +64,15 @@ class Hub:
         What there is to be seen.
     hello : callable
         Describes the robot and a map to a viewer.
+    greet : callable
+        Called when the first viewer comes.
     """
 
-    def __init__(self, feed: Feed, hello: Callable[[], str]) -> None:
+    def __init__(self, feed: Feed, hello: Callable[[], str], greet: Callable[[], None]) -> None:
         self._feed = feed
         self._hello = hello
+        self._greet = greet
+        self._is_greeted = False
         self._viewers: set[Viewer] = set()
         self._changed = asyncio.Event()
         self._shown = View()
@@ -107,6 +111,9 @@ class Hub:
         for kind, frame in self._frames(self._shown, None).items():
             viewer.show(kind, frame)
         self._changed.set()  # the others see that there is one more
+        if not self._is_greeted:
+            self._is_greeted = True
+            self._greet()
         return viewer
 
     def leave(self, viewer: Viewer) -> None:
@@ -142,6 +149,6 @@ class Hub:
         frames: dict[str, Frame] = {"state": as_text(state_object(view, len(self)))}
         if before is None or before.placed is not view.placed:
             frames["scan"] = scan_frame(view.placed, view.map)
-        if before is None or before.belief is not view.belief or before.pose is not view.pose:
+        if before is None or before.belief is not view.belief or before.pose != view.pose:
             frames["particles"] = particles_frame(view.belief, view.pose, view.stamp)
         return frames

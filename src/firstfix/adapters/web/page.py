@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +14,10 @@ from firstfix.adapters.web.map_image import MapPictures
 from firstfix.adapters.web.messages import as_text, hello_object
 from firstfix.adapters.web.steering import Steering
 from firstfix.adapters.web.view import ShownMap
+
+
+def _greet_nobody() -> None:
+    """Do nothing."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -29,6 +34,8 @@ class Page:
         Carries out what people want.
     access : Access
         What is asked of clients.
+    greet : callable
+        Called when the first viewer comes.
     pictures : MapPictures
         Of maps.
     """
@@ -37,6 +44,7 @@ class Page:
     feed: Feed
     steering: Steering
     access: Access = field(default_factory=Access)
+    greet: Callable[[], None] = _greet_nobody
     pictures: MapPictures = field(default_factory=MapPictures)
 
     def hello(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import socket
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -49,7 +50,7 @@ def make_app(page: Page) -> ASGIApp:
     ASGI application
         For `run`, or another server.
     """
-    hub = Hub(page.feed, page.hello)
+    hub = Hub(page.feed, page.hello, page.greet)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -100,13 +101,20 @@ def listen(host: str, port: int) -> socket.socket:
         listening = socket.create_server(address[:2], family=family)
     except OSError as error:
         raise InputError(
-            expected=f"a free port {port} on {host}",
-            received=f"{error.strerror or error}",
-            remedy="choose another --port, or end what listens there",
+            expected=f"port {port} of {host}, free and of this machine",
+            received=_why(error),
+            remedy="choose another --port or --host, or end what listens there",
         ) from error
     if hasattr(socket, "TCP_USER_TIMEOUT"):
         listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _SILENT_MS)
     return listening
+
+
+def _why(error: OSError) -> str:
+    """Return what the system says, without what Python adds to it."""
+    if isinstance(error, socket.gaierror) or not error.errno:
+        return f"{error.strerror or error}"
+    return os.strerror(error.errno)
 
 
 def url_of(listening: socket.socket) -> str:
