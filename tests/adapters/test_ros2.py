@@ -238,6 +238,20 @@ def test_run_waits_for_a_manager_otherwise(lab: Lab) -> None:
     assert states == ["unconfigured"]
 
 
+def test_an_impossible_transition_does_not_end_it(lab: Lab) -> None:
+    states = []
+
+    def during_spin(node) -> None:
+        states.append(node.state)
+        if len(states) == 1:
+            node.trigger_activate()
+
+    lab.world.during_spin = during_spin
+    lab.ros2.run([])
+    assert states == ["unconfigured"] * 2
+    assert "no transition activate" in lab.world.lines("error")[0]
+
+
 @pytest.mark.parametrize(
     "given",
     [["-p", "mode:=full"], ["_mode:=full"], ["--ros-args", "-p", "mode"], ["--ros-args", "-x"]],
