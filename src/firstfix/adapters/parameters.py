@@ -11,12 +11,15 @@ from typing import Any
 from firstfix.amcl.config import AmclConfig
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
-from firstfix.formats.amcl_yaml import IGNORED
+from firstfix.formats.amcl_yaml import DEFAULTS, IGNORED, amcl_config, choices
+from firstfix.formats.messages import to_frame
 from firstfix.formats.ros1_amcl import ros1_remedy
+from firstfix.formats.saved_pose import MAX_POSITION_M
 from firstfix.system.node_config import NodeConfig
 
-_POSE = "initial_pose"
-_POSE_PARTS = tuple(f"{_POSE}.{part}" for part in ("x", "y", "yaw"))
+_OWN = {entry.name: entry.default for entry in fields(NodeConfig) if entry.name != "amcl"}
+_KNOWN = _OWN | DEFAULTS
+_FRAMES = ("base_frame_id", "odom_frame_id", "global_frame_id")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +58,11 @@ def parameters() -> tuple[Parameter, ...]:
             text, default = entry.metadata["description"], entry.default
             limits = entry.metadata["least"], entry.metadata["most"]
             if isinstance(default, SE2):
-                listed += [Parameter(name, 0.0, text, *limits) for name in _POSE_PARTS]
+                parts = (f"{entry.name}.{part}" for part in ("x", "y", "yaw"))
+                listed += [Parameter(name, 0.0, text, *limits) for name in parts]
             elif isinstance(default, Enum):
-                choices = tuple(choice.value for choice in type(default))
-                listed.append(Parameter(entry.name, default.value, text, *limits, choices))
+                named = tuple(choice.value for choice in type(default))
+                listed.append(Parameter(entry.name, default.value, text, *limits, named))
             else:
                 listed.append(Parameter(entry.name, default, text, *limits))
     return tuple(listed)
@@ -94,42 +98,37 @@ def configured(values: Mapping[str, Any]) -> NodeConfig:
     InputError
         If a name is unknown, or a value has the wrong type or is out of its range.
     """
-    known = {parameter.name: parameter for parameter in parameters()}
-    given = {k: v for k, v in values.items() if k.partition(".")[0] not in IGNORED}
-    given.pop(f"{_POSE}.z", None)  # Nav2 has it, and a robot on a floor does not need it
-    for name, value in given.items():
-        if name not in known:
-            raise _unknown(name, value, known)
-        if known[name].choices and value not in known[name].choices:
+    own: dict[str, Any] = {}
+    amcl: dict[str, Any] = {}
+    for name, value in values.items():
+        if name.partition(".")[0] not in IGNORED:
+            (own if name in _OWN else amcl)[name] = _typed(name, value)
+    return NodeConfig(amcl=amcl_config(amcl), **own)
+
+
+def _typed(name: str, value: Any) -> Any:
+    """Return a value as the settings have it; ranges are checked there."""
+    if name not in _KNOWN:
+        near = difflib.get_close_matches(name, _KNOWN, 1)
+        remedy = ros1_remedy(name, str(value)) or (
+            f"the nearest is {near[0]}" if near else "remove it"
+        )
+        raise InputError(expected="parameters of firstfix", received=name, remedy=remedy)
+    default = _KNOWN[name]
+    if isinstance(default, Enum):
+        listed = choices(default)
+        if not isinstance(value, str) or value not in listed:
             raise InputError(
-                expected=f"{name} as one of {', '.join(known[name].choices)}",
+                expected=f"{name} as one of {', '.join(listed)}",
                 received=f"{value!r:.60}",
-                remedy=f"the default is {known[name].default}",
+                remedy=f"the default is {default.value}",
             )
-    parts = [_number(name, given.pop(name, 0.0)) for name in _POSE_PARTS]
-    own = {entry.name: entry.default for entry in fields(NodeConfig)}
-    mine = {k: _typed(own[k], v) for k, v in given.items() if k in own}
-    amcl = {entry.name: entry.default for entry in fields(AmclConfig)}
-    theirs = {k: _typed(amcl[k], v) for k, v in given.items() if k in amcl}
-    return NodeConfig(amcl=AmclConfig(**theirs | {_POSE: SE2(*parts)}), **mine)
-
-
-def _typed(default: Any, value: Any) -> Any:
-    return type(default)(value) if isinstance(default, Enum) else value
-
-
-def _number(name: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return listed[value]
+    is_number = type(value) in (int, float) and abs(value) <= MAX_POSITION_M
+    if name.startswith("initial_pose.") and not is_number:
         raise InputError(
-            expected=f"{name} as a number",
+            expected=f"{name} as a number, up to {MAX_POSITION_M:g}",
             received=f"{value!r:.60}",
             remedy="write metres and radians",
         )
-    return float(value)
-
-
-def _unknown(name: str, value: Any, known: Mapping[str, Parameter]) -> InputError:
-    near = difflib.get_close_matches(name, known, 1)
-    nearest = f"the nearest is {near[0]}" if near else "remove it"
-    remedy = ros1_remedy(name, str(value)) or nearest
-    return InputError(expected="parameters of firstfix", received=name, remedy=remedy)
+    return to_frame(value) if name in _FRAMES and isinstance(value, str) else value

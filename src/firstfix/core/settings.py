@@ -61,7 +61,8 @@ def _checked(name: str, value: object, default: object, metadata: dict[str, Any]
         value = float(value)
     fits = type(value) is type(default) and (value != "" or default == "")
     if fits and isinstance(value, (int, float)):
-        fits = bool(least <= value <= min(most, _WHOLE_LIMIT))  # not for NaN, not for infinity
+        # Not for NaN, not for infinity.
+        fits = bool(max(least, -_WHOLE_LIMIT) <= value <= min(most, _WHOLE_LIMIT))
     if fits:
         return value
     limits = "" if least == -math.inf else f" of at least {least:g}"

@@ -43,10 +43,12 @@ _OLD_MODELS = {
     "differential": MotionModel.DIFFERENTIAL,
     "omnidirectional": MotionModel.OMNIDIRECTIONAL,
 }
+# A robot on a floor does not need z, but Nav2 has it.
 _POSE = {f"initial_pose.{part}": 0.0 for part in ("x", "y", "z", "yaw")}
-_DEFAULTS: dict[str, Any] = {
+DEFAULTS: dict[str, Any] = {
     entry.name: entry.default for entry in fields(AmclConfig) if entry.name != "initial_pose"
 } | _POSE
+"""Of all parameters, by the flat names of ROS."""
 # Above, a float64 may not be the integer that the file says.
 _MAX_INTEGER = 2**53
 # What PyYAML finds in plain scalars by itself; other tags were written by somebody with a plan.
@@ -79,23 +81,29 @@ def load_amcl_config(path: str | os.PathLike[str]) -> AmclConfig:
         wrong type or is out of range.
     """
     path = Path(path)
-    values: dict[str, Any] = {}
-    for name, node in read_parameters(path, "amcl", frozenset(_DEFAULTS)).items():
+    values = {}
+    for name, node in read_parameters(path, "amcl", frozenset(DEFAULTS)).items():
         if name.partition(".")[0] not in IGNORED:
             values[name] = _value(name, node, path)
-    x, y, _, yaw = (values.pop(name, default) for name, default in _POSE.items())
     try:
-        return AmclConfig(initial_pose=SE2(x, y, yaw), **values)
+        return amcl_config(values)
     except InputError as error:
         raise InputError(
             expected=f"{error.expected} in {path}", received=error.received, remedy=error.remedy
         ) from error
 
 
+def amcl_config(values: dict[str, Any]) -> AmclConfig:
+    """Make settings of some of `DEFAULTS`, by their names; raises InputError if out of range."""
+    x, y, _, yaw = (values.get(name, default) for name, default in _POSE.items())
+    settings = {name: value for name, value in values.items() if name not in _POSE}
+    return AmclConfig(initial_pose=SE2(x, y, yaw), **settings)
+
+
 def _value(name: str, node: yaml.Node, path: Path) -> Any:
-    if name not in _DEFAULTS:
+    if name not in DEFAULTS:
         raise _unknown(name, node, path)
-    default = _DEFAULTS[name]
+    default = DEFAULTS[name]
     quoted = getattr(node, "style", None) is not None
     plain = isinstance(node, yaml.ScalarNode) and node.tag in _TAGS
     value = _read(str(node.value).strip(), default, quoted=quoted) if plain else None
@@ -121,7 +129,7 @@ def _told(node: yaml.Node, *, quoted: bool) -> str:
 def _read(text: str, default: Any, *, quoted: bool) -> Any:
     """Read a value of the type of the default; None where it is of another one, as to ROS."""
     if isinstance(default, Enum):
-        return _choices(default).get(text)
+        return choices(default).get(text)
     number = to_number(text)
     if isinstance(default, str):
         bare_word = math.isnan(number) and to_flag(text) is None
@@ -136,14 +144,15 @@ def _read(text: str, default: Any, *, quoted: bool) -> Any:
     return number if math.isfinite(number) else None
 
 
-def _choices(default: Enum) -> dict[str, Enum]:
-    choices: dict[str, Enum] = {choice.value: choice for choice in type(default)}
-    return choices | _OLD_MODELS if isinstance(default, MotionModel) else choices
+def choices(default: Enum) -> dict[str, Enum]:
+    """Return what may be written for a setting, and what it means."""
+    listed: dict[str, Enum] = {choice.value: choice for choice in type(default)}
+    return listed | _OLD_MODELS if isinstance(default, MotionModel) else listed
 
 
 def _wanted(default: Any) -> str:
     if isinstance(default, Enum):
-        return f"one of {', '.join(_choices(default))}"
+        return f"one of {', '.join(choices(default))}"
     words = {bool: "true or false", int: "a whole number", float: "a finite number", str: "text"}
     return words[type(default)]
 
@@ -156,7 +165,7 @@ def _written(default: Any) -> str:
 
 def _unknown(name: str, node: yaml.Node, path: Path) -> InputError:
     text = str(node.value) if isinstance(node, yaml.ScalarNode) else ""
-    near = difflib.get_close_matches(name, [*_DEFAULTS, *IGNORED], 1)
+    near = difflib.get_close_matches(name, [*DEFAULTS, *IGNORED], 1)
     nearest = f"the nearest is {near[0]}" if near else "delete the line, or check the file"
     remedy = ros1_remedy(name, text) or nearest
     if name == "initial_pose":

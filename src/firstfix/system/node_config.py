@@ -32,7 +32,9 @@ class NodeConfig:
     )
     yaml_filename: str = setting("", "map to load; empty: hear it on map_topic")
     saved_pose_file: str = setting(
-        "", "where the last pose outlives a restart, written at save_pose_rate; empty: nowhere"
+        "",
+        "where the last pose outlives a restart, written at save_pose_rate and at the end, removed "
+        "when the pose is lost; empty: nowhere",
     )
     cloud_rate: float = setting(2.0, "most clouds of particles a second, Hz; 0: none", 0.0, 100.0)
     status_rate: float = setting(
