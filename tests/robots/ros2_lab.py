@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,11 @@ from firstfix.formats.outgoing import laser_scan, occupancy_grid, transforms
 from firstfix.sim.lidar import Lidar
 
 STAND_IN = Path(__file__).parent / "rclpy_stand_in"
+OURS = (
+    "rclpy",
+    *(f"rclpy.{path.stem}" for path in (STAND_IN / "rclpy").glob("*.py")),
+    *(f"firstfix.adapters.{name}" for name in ("ros2", "ros2_transport", "ros2_types")),
+)
 ALL = ("nav2_msgs", "kobuki_ros_interfaces")
 # The wheels never turn: whoever changes the pose of the robot carries it.
 T_ODOM_BASE = SE2(5.0, 5.0, 1.0)
@@ -31,10 +37,11 @@ class Lab:
 
     def __init__(self, patch: pytest.MonkeyPatch, optional: tuple[str, ...] = ALL) -> None:
         patch.syspath_prepend(str(STAND_IN))
+        patch.delitem(sys.modules, "ros_types", raising=False)
         ros_types = importlib.import_module("ros_types")
-        ours = [n for n in sys.modules if n.startswith(("rclpy", "firstfix.adapters.ros2"))]
-        for name in [*ours, *ros_types.names()]:
-            patch.delitem(sys.modules, name, raising=False)
+        for name in [*OURS, *ros_types.names()]:
+            patch.setitem(sys.modules, name, ModuleType(name))  # remembers what was there before
+            del sys.modules[name]
         for name, module in ros_types.modules(optional).items():
             patch.setitem(sys.modules, name, module)
         self.rclpy = importlib.import_module("rclpy")

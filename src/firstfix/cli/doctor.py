@@ -6,6 +6,7 @@ import importlib.metadata
 import importlib.util
 import os
 import platform
+import sys
 import time
 
 import typer
@@ -14,6 +15,11 @@ from firstfix import __version__
 
 PACKAGES = ("numpy", "numba", "pillow", "pyyaml", "rosbags", "typer", "rich", "platformdirs")
 PLOTTING = "matplotlib"
+DDS = "cyclonedds"
+
+# What a node of ROS uses where it is there: a client library, and messages that few have.
+CLIENTS = ("rclpy", "rospy")
+MESSAGES = ("tf2_msgs", "diagnostic_msgs", "nav2_msgs", "kobuki_ros_interfaces")
 
 
 def doctor() -> None:
@@ -23,6 +29,7 @@ def doctor() -> None:
     for package in PACKAGES:
         _say(package, _version(package) or "missing: run pip install firstfix again")
     _say(PLOTTING, _version(PLOTTING) or "missing, no pictures: pip install 'firstfix[plot]'")
+    _say(DDS, _version(DDS) or "missing, no ROS 2 without ROS: pip install 'firstfix[dds]'")
     _say("cache", _cache())
     _say("kernels", _kernels())
     _say("ROS", _ros())
@@ -69,7 +76,17 @@ def _kernels() -> str:
 
 def _ros() -> str:
     distribution = os.environ.get("ROS_DISTRO")
-    clients = [name for name in ("rclpy", "rospy") if importlib.util.find_spec(name) is not None]
+    clients, messages = _found(CLIENTS), _found(MESSAGES)
     if distribution is None and not clients:
-        return "not seen; not needed for maps, bags and scans in files"
-    return f"{distribution or 'no ROS_DISTRO'}, {' and '.join(clients) or 'no client library'}"
+        return "not seen; not needed for maps, bags and scans in files, nor for firstfix dds"
+    said = f"{distribution or 'no ROS_DISTRO'}, {' and '.join(clients) or 'no client library'}"
+    if messages:
+        said += f"; {', '.join(messages)}"
+    prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    if "rclpy" in clients and sys.prefix not in prefixes:
+        said += f"; for ros2 run: export AMENT_PREFIX_PATH={sys.prefix}:$AMENT_PREFIX_PATH"
+    return said
+
+
+def _found(names: tuple[str, ...]) -> list[str]:
+    return [name for name in names if importlib.util.find_spec(name) is not None]

@@ -124,7 +124,8 @@ def runner(robot: str) -> Callable[[str, list[str], MakeNode], None]:
         if robot == "ros1":
             adapter.run([*arguments, f"_yaml_filename:={map_file}"], make_node)
         elif robot == "ros2":
-            adapter.run([*arguments, "--ros-args", "-p", f"yaml_filename:={map_file}"], make_node)
+            given = ["-p", f"yaml_filename:={map_file}", "-p", "autostart:=true"]
+            adapter.run([*arguments, "--ros-args", *given], make_node)
         else:
             adapter.run(*_settings_of(arguments, map_file), make_node)
 
