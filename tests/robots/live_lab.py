@@ -1,0 +1,125 @@
+"""Servers of the live page in this process, on free loopback ports, and what is behind them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+
+from firstfix.adapters.sim_node import SimNode
+from firstfix.adapters.sim_robot import SimRobot
+from firstfix.adapters.web.feed import Feed
+from firstfix.adapters.web.guard import Access
+from firstfix.adapters.web.page import Page
+from firstfix.adapters.web.server import listen, make_server, url_of
+from firstfix.adapters.web.steering import Steering
+from firstfix.core.grid import OccupancyGrid
+from firstfix.sim.world import WORLDS
+from firstfix.system.inputs import Input, NewMap
+from firstfix.system.localizer import Localizer
+
+WAIT_S = 60.0
+
+
+def until(holds: Callable[[], Any], what: str = "it") -> Any:
+    """Wait until something holds; no test depends on how long that takes."""
+    end = time.monotonic() + WAIT_S
+    while time.monotonic() < end:
+        value = holds()
+        if value:
+            return value
+        time.sleep(0.01)
+    pytest.fail(f"waited {WAIT_S:g} s for {what}")
+
+
+@dataclass
+class Site:
+    """A page that is served, and what is behind it."""
+
+    page: Page
+    url: str
+    given: list[Input] = field(default_factory=list)
+    robot: SimRobot | None = None
+
+    @property
+    def feed(self) -> Feed:
+        return self.page.feed
+
+    @property
+    def live(self) -> str:
+        return self.url.replace("http", "ws") + "v1/live"
+
+
+@contextmanager
+def served(page: Page) -> Iterator[str]:
+    """Serve a page; gives its URL."""
+    with listen("127.0.0.1", 0) as listening:
+        server = make_server(page)
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
+        thread.start()
+        until(lambda: server.started or not thread.is_alive())
+        try:
+            yield url_of(listening)
+        finally:
+            server.should_exit = True
+            thread.join()
+
+
+@contextmanager
+def fed(access: Access | None = None, feed: Feed | None = None) -> Iterator[Site]:
+    """Serve a page of which nothing is known but what the test feeds it."""
+    given: list[Input] = []
+    feed = feed or Feed("test")
+    page = Page("ros2", feed, Steering(feed, given.append), access or Access())
+    with served(page) as url:
+        yield Site(page, url, given)
+
+
+@contextmanager
+def simulated(grid: OccupancyGrid, seed: int = 1, access: Access | None = None) -> Iterator[Site]:
+    """Serve a simulated robot."""
+    feed = Feed("house")
+    robot = SimRobot(grid, seed)
+    wrong: list[str] = []
+    node = SimNode(grid, robot, [feed], feed.know, wrong.append)
+    page = Page("sim", feed, Steering(feed, node.give, robot), access or Access())
+    with served(page) as url:
+        node.start()
+        try:
+            yield Site(page, url, robot=robot)
+        finally:
+            node.stop()
+    assert wrong == []
+
+
+@dataclass
+class Drive:
+    """A robot that goes on by a scan only when the test says so."""
+
+    robot: SimRobot
+    localizer: Localizer
+    feed: Feed
+
+    def give(self, given: Input) -> None:
+        self.feed(given, self.localizer.handle(given), self.localizer)
+
+    def step(self, scans: int = 1) -> None:
+        for _ in range(scans):
+            moment = self.robot.step()
+            if moment is not None:
+                self.feed.know(moment.T_map_base)
+                for event in moment.events:
+                    self.give(event)
+
+
+def drive(world: str = "house", seed: int = 1) -> Drive:
+    """Put a robot into a world, with its map and not yet a scan."""
+    grid = WORLDS[world]()
+    begun = Drive(SimRobot(grid, seed), Localizer(), Feed(world))
+    begun.give(NewMap(0.0, grid))
+    return begun
