@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import stats
 
 from firstfix.amcl.initial import around_hypotheses, around_pose, free_poses, over_free_space
 from firstfix.core.angles import wrap
@@ -111,6 +110,8 @@ def drawn() -> OccupancyGrid:
 
 
 def test_anywhere_is_evenly_over_free_cells_in_any_direction():
+    from scipy import stats  # 1 s: only in the process that runs this test
+
     grid, n = drawn(), 40_000
     particles = over_free_space(grid, n, np.random.default_rng(2))
     cells = grid.to_cells(particles.poses()[:, :2])
