@@ -1,8 +1,10 @@
 """A drawn hall on disk, and the command line in this process."""
 
-from collections.abc import Callable
+import pickle
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,6 +44,32 @@ def cli(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.
         return Ended(status, captured.out, captured.err)
 
     return call
+
+
+def _sent(thing: Any) -> Any:
+    return pickle.loads(pickle.dumps(thing))  # noqa: S301 - our own
+
+
+@pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run the tasks of a benchmark here: each process of its own takes a second or two to start.
+
+    Tasks and results go through pickle, as on their way to a process and back. The processes have
+    tests of their own.
+    """
+
+    def run(
+        tasks: Sequence[Callable[[], Any]], jobs: int, on_done: Callable[[int, Any], None]
+    ) -> list[Any]:
+        results = []
+        for i, task in enumerate(tasks):
+            results.append(_sent(_sent(task)()))
+            on_done(i, results[i])
+        return results
+
+    # `apart` last: who is imported now must keep the true one for later.
+    for place in ("bench", "track_bench", "apart"):
+        monkeypatch.setattr(f"firstfix.evaluation.{place}.run_apart", run)
 
 
 def write_case(folder: Path, grid: OccupancyGrid, poses: list[SE2], site: str) -> Path:

@@ -132,6 +132,7 @@ def test_figures_that_cannot_be_written(cli, unique: Files, tmp_path: Path) -> N
     assert_one_line(cli("bench", unique[0].parent, "--report", "file/report"), "file/report")
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_case_without_truth(cli, unique: Files, tmp_path: Path) -> None:
     folder = tmp_path / "case"
     folder.mkdir()

@@ -37,7 +37,9 @@ def test_every_disturbance_has_time_after_it() -> None:
                 assert sum(getattr(p, "seconds", 0.0) for p in calm) >= kidnap_scripts.AFTER_S
 
 
-def test_a_world_is_played_and_told(cli, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("in_this_process")
+def test_a_world_is_played_and_told(cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kidnap_scripts, "_NOTHING_S", 20.0)
     arguments = ["--worlds", "house", "--scenarios", 2, "--seed", 5, "--jobs", 2]
     ended = cli("bench", "--kidnap", *arguments, "--json", "k.json", "--report", "out")
     assert ended.status == 0, ended
@@ -93,6 +95,7 @@ def _rows(truth: np.ndarray | None) -> np.ndarray | None:
     return None if truth is None else truth[::4]
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_cases_that_cannot_be_spliced_are_named(cli, drive: Path, cases: Path) -> None:
     ended = cli("bench", drive, "--kidnap", "--cases", cases / "unique", "--jobs", 2)
     assert (ended.status, ended.out) == (2, "")

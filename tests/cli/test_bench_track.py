@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_cases_with_odometry_are_followed_and_others_named(
     cli, cases: Path, drive: Path, tmp_path: Path
 ) -> None:
@@ -21,6 +22,7 @@ def test_cases_with_odometry_are_followed_and_others_named(
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["bench.json"]
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_seed_and_parameters_reach_the_filter(cli, drive: Path, tmp_path: Path) -> None:
     (tmp_path / "amcl.yaml").write_text(
         "amcl: {ros__parameters: {min_particles: 50, max_particles: 60, random_seed: 3}}"
@@ -59,6 +61,7 @@ def test_options_that_do_not_fit_are_refused(
     assert word in ended.err
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_cases_without_any_odometry_are_refused(cli, cases: Path, tmp_path: Path) -> None:
     ended = cli("bench", cases / "unique", "--track", "--json", "b.json")
     assert (ended.status, ended.out) == (2, "")

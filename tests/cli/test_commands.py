@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from firstfix import __version__
+from firstfix.sim.mishaps import CarryTo, Teleport
+from firstfix.sim.phases import Stand
 
 Files = tuple[Path, Path]
 
@@ -38,6 +40,7 @@ def test_version(cli) -> None:
     assert cli("--version").out == f"firstfix {__version__}\n"
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_bench_compares_with_the_truth_and_writes_it_down(cli, cases: Path, tmp_path: Path) -> None:
     arguments = ["--foreign", "--jobs", 2, "--json", "out/bench.json", "--report", "out/report"]
     ended = cli("bench", cases, *arguments)
@@ -149,6 +152,13 @@ def test_map_show_draws_here_and_never_over_the_map(cli, unique: Files, tmp_path
     assert str(tmp_path / "firstfix-map.png") in ended.out
 
 
+@pytest.fixture
+def short_story(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the robot of the demo stand, and be carried away: some seconds instead of a minute."""
+    acts = (Stand(1.0), CarryTo(seconds=1.0), Stand(1.0), Teleport(), Stand(3.0))
+    monkeypatch.setattr("firstfix.cli.story.SCRIPT", acts)
+
+
 def test_the_demo_tells_a_story_that_ends_well(cli, tmp_path: Path) -> None:
     ended = cli("demo", "--world", "house", "--headless", "--seed", 3)
     assert (ended.status, ended.err) == (0, ""), ended
@@ -165,6 +175,7 @@ def test_the_demo_says_so_where_nobody_can_know(cli) -> None:
     assert "not all went well" in ended.out.splitlines()[-1]
 
 
+@pytest.mark.usefixtures("short_story")
 def test_the_demo_without_matplotlib_tells_its_story_all_the_same(
     cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -176,6 +187,7 @@ def test_the_demo_without_matplotlib_tells_its_story_all_the_same(
     assert not (tmp_path / "firstfix-demo.png").exists()
 
 
+@pytest.mark.usefixtures("short_story")
 def test_the_demo_takes_a_map_of_ones_own(cli, unique: Files) -> None:
     assert cli("demo", "--headless", "--world", unique[0], "--plot", "own.svg").status in (0, 1)
     assert Path("own.svg").exists()
