@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "robots"))
 
+import dds_lab
 from recorder import Recorder
 
 REQUIRED = set(filter(None, os.environ.get("FIRSTFIX_REQUIRE", "").split(",")))
@@ -21,6 +23,16 @@ def missing(part: str, why: str) -> None:
     if part in REQUIRED:
         pytest.fail(f"FIRSTFIX_REQUIRE asks for {part}: {why}")
     pytest.skip(why)
+
+
+@pytest.fixture
+def dds(tmp_path: Path) -> Iterator[dds_lab.Lab]:
+    """Give a domain of DDS on the loopback interface."""
+    if why := dds_lab.why_missing():
+        missing("dds", why)
+    lab = dds_lab.Lab(tmp_path)
+    yield lab
+    lab.end()
 
 
 @pytest.fixture

@@ -25,6 +25,8 @@ LOOPBACK = (
     "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
     "<Peers><Peer address='127.0.0.1'/></Peers></Discovery>"
 )
+# Types that are not what they claim to be must not keep the ears of the tests shut.
+NAMES_COUNT = "<Compatibility><IgnoreTypeInformation>1.16</IgnoreTypeInformation></Compatibility>"
 # A busy machine is not a bug: generous, since nobody waits so long when all is well.
 PATIENCE_S = 90.0
 
@@ -87,25 +89,35 @@ class Lab:
         kept = {k: v for k, v in os.environ.items() if not k.startswith(("ROS_", "CYCLONEDDS"))}
         self.environment = kept | {"CYCLONEDDS_URI": LOOPBACK, "ROS_DOMAIN_ID": str(self.domain)}
         self._programs: list[Program] = []
-        # Types that are not what they claim to be must not keep these ears shut.
-        ignore = (
-            "<Compatibility><IgnoreTypeInformation>1.16</IgnoreTypeInformation></Compatibility>"
-        )
-        self._domain = Domain(self.domain, LOOPBACK + ignore)
+        self._domain = Domain(self.domain, LOOPBACK + NAMES_COUNT)
         self.participant = DomainParticipant(self.domain)
 
     def node(self, *arguments: str, **environment: str) -> Program:
         """Start a node."""
         return self._start([sys.executable, "-m", "firstfix", "dds", *arguments], environment)
 
-    def robot(self, script: str, *arguments: str, **environment: str) -> Program:
+    def robot(self, script: str, *arguments: str, truth: str = "truth.jsonl") -> Program:
         """Start a robot."""
-        program = [sys.executable, str(ROBOT), script, str(self.truth_file), *arguments]
-        return self._start(program, environment)
+        program = [sys.executable, str(ROBOT), script, str(self.folder / truth), *arguments]
+        return self._start(program, {})
 
     def ear(self, topic: str, kind: str, *policies: Any) -> Ear:
         """Listen to a topic of ROS."""
         return Ear(self.participant, f"rt{topic}", kind, *policies)
+
+    def ear_named(self, name: str, kind: str) -> Ear:
+        """Listen to a latched topic by its name in DDS."""
+        from cyclonedds.qos import Policy
+
+        how = (Policy.Reliability.Reliable(10**9), Policy.Durability.TransientLocal)
+        return Ear(self.participant, name, kind, *how)
+
+    def latched_sender(self, topic: str, kind: str) -> Any:
+        """Publish a latched topic of ROS."""
+        from firstfix.adapters.dds_ends import Sender
+        from firstfix.adapters.topics import Delivery, Topic
+
+        return Sender(self.participant, Topic(topic, kind, Delivery.LATCHED), f"rt{topic}")
 
     def end(self) -> None:
         """End all that still runs."""
@@ -113,14 +125,9 @@ class Lab:
             program.process.kill()
             program.process.wait()
 
-    @property
-    def truth_file(self) -> Path:
-        """Where the robot writes its true poses."""
-        return self.folder / "truth.jsonl"
-
-    def truth(self) -> np.ndarray:
-        """Return the true poses of the robot so far: stamp, x, y, yaw."""
-        lines = self.truth_file.read_text(encoding="utf-8").splitlines()
+    def truth(self, name: str = "truth.jsonl") -> np.ndarray:
+        """Return the true poses of a robot so far: stamp, x, y, yaw."""
+        lines = (self.folder / name).read_text(encoding="utf-8").splitlines()
         return np.array([json.loads(line) for line in lines if line.endswith("]")])
 
     def _start(self, arguments: list[str], environment: dict[str, str]) -> Program:
@@ -152,6 +159,15 @@ class Ear:
         samples = self.reader.take(10_000)
         self._heard += [self._decode(s.data) for s in samples if s.sample_info.valid_data]
         return self._heard
+
+    def latched(self) -> Any:
+        """Return the first message, as soon as it is there."""
+        return wait_for(lambda: self.heard)[0]
+
+    def senders(self) -> list[Any]:
+        """Return what discovery says about those who publish."""
+        handles = self.reader.get_matched_publications()
+        return [self.reader.get_matched_publication_data(handle) for handle in handles]
 
 
 def wait_for(find: Callable[[], Found], patience_s: float = PATIENCE_S) -> Found:

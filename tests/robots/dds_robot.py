@@ -56,11 +56,11 @@ def main() -> None:
     participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
     writers = {}
     for topic, kind in TYPES.items():
-        above = "" if topic.startswith("/") else f"{options.namespace}/"
+        full = f"{options.namespace}/{topic.removeprefix('/')}"
         is_latched = topic in LATCHED and (topic, options.map) != ("map", "volatile")
         kept = Policy.Durability.TransientLocal if is_latched else Policy.Durability.Volatile
         how = Policy.Reliability.BestEffort if topic == "scan" else RELIABLE
-        writers[topic] = writer(participant, f"rt{above}{topic}", kind, how, kept)
+        writers[topic] = writer(participant, f"rt{full}", kind, how, kept)
 
     def publish(topic: str, message: Any) -> None:
         writers[topic].write(Cdr(encode(TYPES[topic], message)))
