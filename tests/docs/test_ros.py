@@ -1,0 +1,97 @@
+"""The page on ROS names topics, parameters, files and sentences that exist."""
+
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+from firstfix.adapters.parameters import configured, flattened, parameters
+from firstfix.adapters.ros_arguments import names_from, settings_from
+from firstfix.adapters.topics import PARTICLES, heard_topics, said_topics
+from firstfix.system.node_config import Mode, NodeConfig
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "ros.md").read_text(encoding="utf-8")
+ROW = re.compile(r"^\|(.*)\|$", re.MULTILINE)
+
+
+def table(title: str) -> list[list[str]]:
+    """Return the cells of the first table of a chapter, without its head."""
+    chapter = re.split(rf"^## {re.escape(title)}$", PAGE, flags=re.MULTILINE)[1]
+    rows = [
+        row.split("|") for row in ROW.findall(re.split(r"^## ", chapter, flags=re.MULTILINE)[0])
+    ]
+    width = len(rows[0])
+    return [[cell.strip() for cell in row] for row in rows[2:] if len(row) == width]
+
+
+def test_topics_are_those_of_the_node() -> None:
+    told = {
+        (way, name.split("`")[1], kind.strip("`"), delivery)
+        for way, name, kind, delivery in table("Topics")
+    }
+    full = NodeConfig(mode=Mode.FULL)
+    said = [*said_topics(NodeConfig(), PARTICLES), *said_topics(full, PARTICLES)]
+    deliveries = {
+        "SENSOR": "best effort",
+        "RELIABLE": "reliable",
+        "LATCHED": "reliable, latched",
+        "LATCHED_MANY": "reliable, latched",
+    }
+    assert told == {
+        (way, topic.name, topic.type_name, deliveries[topic.delivery.name])
+        for way, topics in (("in", heard_topics(full).values()), ("out", said))
+        for topic in topics
+    }
+
+
+def test_defaults_are_those_of_the_node() -> None:
+    known = {parameter.name: parameter.default for parameter in parameters()}
+    for name, default, _ in table("Parameters"):
+        value = known[name.strip("`")]
+        text = str(value).lower() if isinstance(value, bool) else str(value)
+        assert default.strip("`") == (text or "empty")
+
+
+def test_sentences_are_those_of_the_node() -> None:
+    code = "".join(path.read_text() for path in (ROOT / "src" / "firstfix").rglob("*.py"))
+    code = re.sub(r'"\s*f?"', "", code)
+    for sentence, _ in table("What the node complains of"):
+        words = sentence.strip("`").split("; ")
+        for part in words:
+            # What stands at the ends is put in by the code.
+            fixed = re.sub(r"^expected | (scan|map|events/cliff|odometry)$", "", part)
+            assert fixed in code, f"{sentence} is nowhere said"
+
+
+def test_parameters_of_the_example_are_right() -> None:
+    (text,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+    values = flattened(yaml.safe_load(text)["firstfix"]["ros__parameters"])
+    assert configured(values).mode is Mode.FULL
+
+
+def test_the_launch_file_of_the_example_is_python() -> None:
+    (text,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    compile(text, "localization.launch.py", "exec")
+    assert '"bond_timeout": 0.0' in text
+
+
+@pytest.mark.parametrize(
+    "line", re.findall(r"^    \S*firstfix dds --ros-args (.*)$", PAGE, re.MULTILINE)
+)
+def test_arguments_of_the_example_are_right(line: str) -> None:
+    words = line.split()
+    pairs = list(zip(words[::2], words[1::2], strict=True))
+    rules = [value for flag, value in pairs if flag == "-r"]
+    given = [value for flag, value in pairs if flag == "-p"]
+    names = names_from(rules, "firstfix", "/")
+    config = settings_from(node=names.node, amcl_file=None, files=[], assignments=given, options={})
+    assert config.mode is Mode.FULL
+    assert names.resolve("scan") == "/base_scan"
+
+
+def test_what_is_started_is_in_the_package() -> None:
+    for name in ("firstfix.launch.py", "firstfix_node", "config/firstfix.yaml"):
+        assert name in PAGE
+        assert list((ROOT / "ros").rglob(Path(name).name))
