@@ -25,9 +25,9 @@ KEYS = {
     "median_m", "median_deg", "p95_m", "cpu_s", "cpu_s_p95", "wall_s", "prepare_s", "rss_mb",
 }  # fmt: skip
 
-HIT = Outcome(0, Verdict.UNIQUE, PoseError(0.02, 0.001), 1, 0.03, 0.04)
-WRONG = Outcome(1, Verdict.UNIQUE, PoseError(5.0, 0.001), None, 0.05, 0.06)
-LOST = Outcome(2, Verdict.NO_MATCH, NO_POSE, None, 0.01, 0.02)
+HIT = Outcome(0, Verdict.UNIQUE, PoseError(0.02, 0.001), 1, 0.03, 0.04, 0.99)
+WRONG = Outcome(1, Verdict.UNIQUE, PoseError(5.0, 0.001), None, 0.05, 0.06, 0.96)
+LOST = Outcome(2, Verdict.NO_MATCH, NO_POSE, None, 0.01, 0.02, 0.0)
 
 
 def run(name: str, method: Method, *outcomes: Outcome) -> CaseRun:
@@ -40,9 +40,9 @@ RUNS = [
     run("a", Method.PAPER, WRONG),
 ]
 FOREIGN = [
-    ForeignRun("a", "b", Method.FAST, 3, 1),
-    ForeignRun("b", "a", Method.FAST, 1, 0),
-    ForeignRun("a", "b", Method.PAPER, 3, 3),
+    ForeignRun("a", "b", Method.FAST, 3, 1, "real", (0.97, 0.4, 0.0)),
+    ForeignRun("b", "a", Method.FAST, 1, 0, "sim", (0.3,)),
+    ForeignRun("a", "b", Method.PAPER, 3, 3, "real", (1.0, 1.0, 1.0)),
 ]
 METHODS = [Method.FAST, Method.PAPER]
 DOCUMENT = bench_document(RUNS, FOREIGN, METHODS)

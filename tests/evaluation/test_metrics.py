@@ -16,7 +16,7 @@ def outcome(
     metres: float, degrees: float, rank: int | None, verdict: Verdict = Verdict.UNIQUE
 ) -> Outcome:
     error = PoseError(metres, math.radians(degrees))
-    return Outcome(0, verdict, error, rank, cpu_s=metres, wall_s=2 * metres)
+    return Outcome(0, verdict, error, rank, cpu_s=metres, wall_s=2 * metres, probability=0.5)
 
 
 FIVE = [
@@ -24,7 +24,7 @@ FIVE = [
     outcome(0.3, 2.0, 1),
     outcome(0.1, 5.0, 1, Verdict.AMBIGUOUS),
     outcome(7.0, 90.0, 4),
-    Outcome(0, Verdict.NO_MATCH, NO_POSE, None, cpu_s=0.0, wall_s=0.0),
+    Outcome(0, Verdict.NO_MATCH, NO_POSE, None, cpu_s=0.0, wall_s=0.0, probability=0.0),
 ]
 
 

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from firstfix.cli.bench_kidnap import PANEL as KIDNAP_PANEL
 from firstfix.cli.bench_kidnap import MoreCases, Scenarios, Worlds, bench_kidnap
+from firstfix.cli.bench_locate import bench_locate
+from firstfix.cli.bench_suite import Runs, Suites, bench_suite
 from firstfix.cli.bench_track import PANEL, Params, Seed, bench_track
-from firstfix.cli.progress import progress
-from firstfix.cli.targets import check_file, check_folder, check_plots, write_json
+from firstfix.cli.options import refuse_options
 from firstfix.core.errors import InputError
 from firstfix.global_localization.config import Method
-
-if TYPE_CHECKING:
-    from firstfix.evaluation.bench import CaseTask, ForeignTask
-    from firstfix.evaluation.runs import CaseRun, ForeignRun
 
 
 def bench(
@@ -68,6 +65,8 @@ def bench(
     scenarios: Scenarios = None,
     worlds: Worlds = None,
     more_cases: MoreCases = None,
+    suite: Suites = None,
+    runs: Runs = None,
 ) -> None:
     """Locate every scan of every case and compare with the truth.
 
@@ -78,13 +77,30 @@ def bench(
     cases = [*(cases or []), *(more_cases or [])]
     of_locating = {"--method": method, "--foreign": foreign, "--limit": limit}
     of_kidnapping = {"--kidnap": kidnapped, "--scenarios": scenarios, "--worlds": worlds}
+    of_suites = {"--suite": suite, "--runs": runs}
+    if suite is not None:
+        others: dict[str, object] = {"--method": method, "--foreign": foreign, "--params": params}
+        others |= {"--track": tracked, "--kidnap": kidnapped, "--scenarios": scenarios}
+        refuse_options(f"--suite {suite.value}", others)
+        bench_suite(
+            suite,
+            cases,
+            worlds=worlds,
+            runs=runs,
+            seed=seed,
+            limit=limit,
+            jobs=jobs,
+            json_file=json_file,
+            report=report,
+        )
+        return
     if tracked:
-        _refuse("--track", {"--report": report, **of_locating, **of_kidnapping})
+        refuse_options("--track", {"--report": report, **of_locating, **of_kidnapping, **of_suites})
         _check_cases(cases)
         bench_track(cases, json_file, jobs, params, seed)
         return
     if kidnapped:
-        _refuse("--kidnap", {"--params": params, **of_locating})
+        refuse_options("--kidnap", {"--params": params, **of_locating, **of_suites})
         bench_kidnap(
             cases,
             worlds,
@@ -97,58 +113,27 @@ def bench(
         return
     if scenarios is not None or worlds is not None:
         raise InputError(
-            expected="--scenarios and --worlds with --kidnap",
-            received="one of them without it",
+            expected="--scenarios with --kidnap, --worlds with it or --suite paper",
+            received="one of them without",
             remedy="add --kidnap, or leave them out",
         )
     if params is not None or seed is not None:
         raise InputError(
-            expected="--params and --seed with --track, or --seed with --kidnap",
+            expected="--params and --seed with --track, or --seed with --kidnap or --suite",
             received="one of them without",
             remedy="add --track, or leave them out: locating has no chance in it",
         )
+    refuse_options("locating", of_suites)
     _check_cases(cases)
-    from firstfix.cli.cases import find_cases
-    from firstfix.evaluation import bench as runner
-    from firstfix.evaluation.document import bench_document
-    from firstfix.evaluation.runs import CaseRun, ForeignRun
-    from firstfix.evaluation.tables import bench_table, foreign_table
-
-    methods = list(dict.fromkeys(method or [Method.FAST]))
-    found = find_cases(cases)
-    _check_targets(json_file, report)
-    tasks: list[CaseTask | ForeignTask] = [*runner.case_tasks(found, methods, limit)]
-    if foreign:
-        tasks += runner.foreign_tasks(found, methods, limit)
-    with progress(len(tasks), "bench") as done:
-        runs = runner.run_tasks(tasks, jobs, lambda run: done(_told(run)))
-    own = [run for run in runs if isinstance(run, CaseRun)]
-    others = [run for run in runs if isinstance(run, ForeignRun)]
-    document = bench_document(own, others, methods)
-    typer.echo(bench_table(document), nl=False)
-    if foreign:
-        typer.echo("\n" + foreign_table(document), nl=False)
-        if not others:
-            typer.echo("note: no two cases have different sites; nothing foreign tried", err=True)
-    if json_file is not None:
-        write_json(document, json_file)
-    if report is not None:
-        from firstfix.evaluation.report import write_report
-
-        typer.echo(f"report: {write_report(own, document, report)}", err=True)
-
-
-def _told(run: CaseRun | ForeignRun) -> str:
-    return f"{run.case}, {run.method.value}"
-
-
-def _check_targets(json_file: Path | None, report: Path | None) -> None:
-    """Refuse before hours of work what could not be written after them."""
-    if json_file is not None:
-        check_file(json_file)
-    if report is not None:
-        check_plots()
-        check_folder(report)
+    bench_locate(
+        cases,
+        list(dict.fromkeys(method or [Method.FAST])),
+        foreign=foreign,
+        jobs=jobs,
+        limit=limit,
+        json_file=json_file,
+        report=report,
+    )
 
 
 def _check_cases(cases: list[Path]) -> None:
@@ -156,16 +141,5 @@ def _check_cases(cases: list[Path]) -> None:
         raise InputError(
             expected="CASES: at least one folder of a case, or of cases",
             received="none",
-            remedy="name one; only --kidnap can do without",
-        )
-
-
-def _refuse(measure: str, options: dict[str, object]) -> None:
-    """Refuse options that were given although they are not about what is measured."""
-    wrong = [name for name, value in options.items() if value]
-    if wrong:
-        raise InputError(
-            expected=f"{measure} without options of other benchmarks",
-            received=f"{measure} with {', '.join(wrong)}",
-            remedy="leave it out: it is not about this",
+            remedy="name one; only --kidnap and --suite paper or scaling can do without",
         )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from firstfix.cli.progress import progress
-from firstfix.cli.targets import check_file, check_folder, check_plots, write_json
+from firstfix.cli.targets import check_targets, write_json
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -91,11 +91,7 @@ def bench_kidnap(
     """
     names = _worlds(worlds) if worlds is not None or not cases else []
     tasks = _tasks(names, cases, scenarios, seed)
-    if json_file is not None:
-        check_file(json_file)
-    if report is not None:
-        check_plots()
-        check_folder(report)
+    check_targets(json_file, report)
     from firstfix.evaluation.apart import run_apart
     from firstfix.evaluation.kidnap_bench import kidnap_document, kidnap_table, kinds_table
 

@@ -51,6 +51,15 @@ def check_plots() -> None:
     new_figure(1.0, 1.0)
 
 
+def check_targets(json_file: Path | None, report: Path | None) -> None:
+    """Refuse before hours of work what could not be written after them."""
+    if json_file is not None:
+        check_file(json_file)
+    if report is not None:
+        check_plots()
+        check_folder(report)
+
+
 def write_json(document: dict[str, Any], path: Path) -> None:
     """Write a document, all or nothing."""
     text = json.dumps(document, indent=2, allow_nan=False)

@@ -7,7 +7,9 @@
      "foreign": {"n", "unique"},
      "total": {"name": "total", "method", ...the same figures...},
      "totals": [...one such total for each method...],
-     "foreign_cases": [{"name", "on", "method", "n", "unique"}, ...]}
+     "foreign_cases": [{"name", "on", "method", "n", "unique"}, ...],
+     "reliability": [...see `reliability`...],
+     "machine": {...see `machine.this_machine`...}}
 
 ``total`` and ``foreign`` are those of the first method asked for: a mean over different methods
 would be the figure of none.
@@ -19,7 +21,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from firstfix.evaluation.machine import this_machine
 from firstfix.evaluation.metrics import mean_of_known, summarize, total
+from firstfix.evaluation.reliability import reliability_document
 from firstfix.evaluation.runs import CaseRun, ForeignRun
 from firstfix.global_localization.config import Method
 
@@ -53,6 +57,8 @@ def bench_document(
             {"name": f.case, "on": f.on, "method": f.method.value, "n": f.n, "unique": f.unique}
             for f in foreign
         ],
+        "reliability": reliability_document(runs, foreign),
+        "machine": this_machine(),
     }
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".svg", ".pdf")
@@ -70,6 +71,14 @@ def share_curve(
     known = np.isfinite(ordered)
     x = np.concatenate([[least], np.clip(ordered[known], least, most), [most]])
     return x, np.concatenate([[0.0], share[known], [known.mean()]])
+
+
+def number_plainly(axis: Axis) -> None:
+    """Put plain numbers on a logarithmic axis, between the decades too if there are few."""
+    from matplotlib.ticker import LogFormatter
+
+    axis.set_major_formatter(LogFormatter())
+    axis.set_minor_formatter(LogFormatter(labelOnlyBase=False, minor_thresholds=(2.0, 0.5)))
 
 
 def can_draw() -> bool:

@@ -56,6 +56,8 @@ class Outcome:
         Rank of the first hypothesis within `FOUND` of the truth, from 1; None if there is none.
     cpu_s, wall_s : float
         Processor and wall time of ``locate``, s.
+    probability : float
+        That was claimed for the best hypothesis, 0 to 1; 0 if there is none.
     """
 
     index: int
@@ -64,6 +66,7 @@ class Outcome:
     rank: int | None
     cpu_s: float
     wall_s: float
+    probability: float
 
     @property
     def is_found(self) -> bool:
@@ -104,4 +107,10 @@ def judge(result: LocateResult, truth: SE2, *, index: int, cpu_s: float, wall_s:
         ranks[0] if ranks else None,
         cpu_s,
         wall_s,
+        best_probability(result),
     )
+
+
+def best_probability(result: LocateResult) -> float:
+    """Return the probability of the best hypothesis; 0 if there is none."""
+    return result.best.probability if result.best is not None else 0.0

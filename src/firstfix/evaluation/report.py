@@ -8,9 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from firstfix.evaluation.figure import PALETTE, line_style, new_figure, save_figure, share_curve
+from firstfix.evaluation.figure import (
+    PALETTE,
+    line_style,
+    new_figure,
+    number_plainly,
+    save_figure,
+    share_curve,
+)
+from firstfix.evaluation.machine import machine_text
 from firstfix.evaluation.outcome import FOUND
 from firstfix.evaluation.page import write_page
+from firstfix.evaluation.reliability import reliability_table
+from firstfix.evaluation.reliability_picture import save_reliability
 from firstfix.evaluation.runs import CaseRun
 from firstfix.evaluation.tables import bench_table, foreign_table
 from firstfix.global_localization.config import Method
@@ -24,6 +34,14 @@ LEGEND = (
     "Success: the best hypothesis within 0.5 m and 10° of the truth, whatever the verdict. "
     "Unique, right and wrong: verdict UNIQUE, of these right (share) and wrong (count). "
     "Errors are those of the successes. Times are of `locate` alone, one scan."
+)
+
+RELIABILITY = (
+    "Left: of the scans for whose best place a probability was claimed, so many are right (bars: "
+    "95 % intervals; small numbers: scans). Right: if everything from a probability on is "
+    "answered, so much is covered, and so much of it is wrong. Scans count alike, whatever case "
+    "they are of. Foreign: scans of other buildings, where they were tried; they have no right "
+    "answer, so that every answer is a risk."
 )
 
 
@@ -51,6 +69,7 @@ def write_report(runs: Sequence[CaseRun], document: dict[str, Any], folder: Path
     """
     save_error_curves(runs, folder / "error_curves.png")
     save_times(runs, folder / "time_by_area.png")
+    save_reliability(document["reliability"], folder / "reliability.png")
     return write_page(_parts(document), folder)
 
 
@@ -77,8 +96,6 @@ def save_error_curves(runs: Sequence[CaseRun], path: Path) -> Path:
 def save_times(runs: Sequence[CaseRun], path: Path) -> Path:
     """Plot processor time of a scan, median and 95th percentile, against the free area."""
     figure = new_figure(9.0, 6.0)
-    from matplotlib.ticker import LogFormatter
-
     axes = figure.subplots()
     for method, colour, marker in zip(_methods(runs), PALETTE, "osD^v*", strict=False):
         own = [run for run in runs if run.method is method]
@@ -98,9 +115,8 @@ def save_times(runs: Sequence[CaseRun], path: Path) -> Path:
             )
     axes.set(xscale="log", yscale="log")
     axes.margins(0.12)
-    for axis in (axes.xaxis, axes.yaxis):  # plain numbers, between the decades too if few
-        axis.set_major_formatter(LogFormatter())
-        axis.set_minor_formatter(LogFormatter(labelOnlyBase=False, minor_thresholds=(2.0, 0.5)))
+    number_plainly(axes.xaxis)
+    number_plainly(axes.yaxis)
     axes.set(xlabel="free area of the map, m²", ylabel="CPU time of a scan, ms (line: up to p95)")
     axes.grid(which="both", alpha=0.25)
     axes.legend()
@@ -120,12 +136,17 @@ def _methods(runs: Sequence[CaseRun]) -> list[Method]:
 def _parts(document: dict[str, Any]) -> list[str]:
     parts = [
         "# firstfix bench",
+        machine_text(document["machine"]),
         LEGEND,
         bench_table(document),
     ]
     if document["foreign_cases"]:
         parts += ["## Scans on the maps of other buildings", foreign_table(document)]
     parts += [
+        "## Probabilities",
+        RELIABILITY,
+        reliability_table(document["reliability"]),
+        "![claims and risk](reliability.png)",
         "## Errors",
         "![share of scans by position error](error_curves.png)",
         "## Time",

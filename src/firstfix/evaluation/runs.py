@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from firstfix.core.estimate import Verdict
+from firstfix.core.estimate import LocateResult, Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.evaluation.apart import peak_rss_mb
 from firstfix.evaluation.case import Case, evenly_spaced, known_truth
-from firstfix.evaluation.outcome import Outcome, judge
+from firstfix.evaluation.outcome import Outcome, best_probability, judge
 from firstfix.evaluation.small_room import scan_of, small_room
 from firstfix.global_localization.config import Method
 from firstfix.global_localization.locate import Locator
@@ -61,6 +62,10 @@ class ForeignRun:
         The method.
     n, unique : int
         Scans tried, and how many of them got the verdict UNIQUE: false accepts all.
+    kind : str
+        Where the scans come from.
+    probabilities : tuple of float
+        Of the best place of each scan; 0 where there was none.
     """
 
     case: str
@@ -68,6 +73,8 @@ class ForeignRun:
     method: Method
     n: int
     unique: int
+    kind: str
+    probabilities: tuple[float, ...]
 
 
 def run_case(case: Case, method: Method, limit: int = 0) -> CaseRun:
@@ -95,12 +102,13 @@ def run_case(case: Case, method: Method, limit: int = 0) -> CaseRun:
     recording, grid = case.recording(), case.grid()
     truth = known_truth(case, recording)
     tried = evenly_spaced(np.flatnonzero(np.isfinite(truth).all(axis=1)), limit)
-    _compile_kernels(method)
+    compile_kernels(method)
     start = time.process_time()
     locator = Locator(grid, method=method, cache_dir=None)
     prepare_s = time.process_time() - start
     outcomes = tuple(
-        _try(locator, recording.scans[i], SE2.from_array(truth[i]), i) for i in tried.tolist()
+        try_scan(locator.locate, recording.scans[i], SE2.from_array(truth[i]), i)
+        for i in tried.tolist()
     )
     return CaseRun(
         case=case.name,
@@ -136,18 +144,46 @@ def run_foreign(case: Case, on: Case, method: Method, limit: int = 0) -> Foreign
     scans = case.recording().scans
     locator = Locator(on.grid(), method=method, cache_dir=None)
     tried = evenly_spaced(np.arange(len(scans)), limit)
-    verdicts = [locator.locate(scans[i]).verdict for i in tried.tolist()]
-    return ForeignRun(case.name, on.name, method, len(verdicts), verdicts.count(Verdict.UNIQUE))
+    results = [locator.locate(scans[i]) for i in tried.tolist()]
+    return ForeignRun(
+        case=case.name,
+        on=on.name,
+        method=method,
+        n=len(results),
+        unique=sum(result.verdict is Verdict.UNIQUE for result in results),
+        kind=case.kind,
+        probabilities=tuple(best_probability(result) for result in results),
+    )
 
 
-def _try(locator: Locator, scan: LaserScan, truth: SE2, index: int) -> Outcome:
+def try_scan(
+    locate: Callable[[LaserScan], LocateResult], scan: LaserScan, truth: SE2, index: int
+) -> Outcome:
+    """Locate a scan, take the time and compare with the truth.
+
+    Parameters
+    ----------
+    locate : callable
+        The method, for one map.
+    scan : LaserScan
+        The scan.
+    truth : SE2
+        ``T_map_base``.
+    index : int
+        Index of the scan in its recording.
+
+    Returns
+    -------
+    Outcome
+        The scan in figures.
+    """
     wall, cpu = time.perf_counter(), time.process_time()
-    result = locator.locate(scan)
+    result = locate(scan)
     cpu_s, wall_s = time.process_time() - cpu, time.perf_counter() - wall
     return judge(result, truth, index=index, cpu_s=cpu_s, wall_s=wall_s)
 
 
-def _compile_kernels(method: Method) -> None:
+def compile_kernels(method: Method) -> None:
     """Locate in a small room, so that no figure contains the compiler."""
     grid = small_room()
     scan = scan_of(grid, SE2(3.0, 2.5, 0.4))

@@ -31,12 +31,12 @@ from firstfix.global_localization.verdict import judge, place_probabilities
 from firstfix.global_localization.verify import Verification, verify
 
 # A third of the beams sorts out most places; the rest is spent on those that stay.
-_FIRST_LOOK_BEAMS = 60
-_SECOND_LOOK_PLACES = 48
+FIRST_LOOK_BEAMS = 60
+SECOND_LOOK_PLACES = 48
 
 # So many places are listed however unlikely, and all that are a hundredth as likely as the best.
-_LISTED_PLACES = 10
-_RIVAL_SHARE = 0.01
+LISTED_PLACES = 10
+RIVAL_SHARE = 0.01
 
 
 class Locator:
@@ -156,11 +156,11 @@ def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateRe
 
     candidates, report = search(beams, fields, config.shortlist, config.budget_s)
     poses = refine_on_field(candidates.poses, beams, fields)
-    first_look = verify(poses, beams.thinned(_FIRST_LOOK_BEAMS), fields)
-    poses = poses[distinct_places(poses, first_look.scores, resolution, _SECOND_LOOK_PLACES)]
+    first_look = verify(poses, beams.thinned(FIRST_LOOK_BEAMS), fields)
+    poses = poses[distinct_places(poses, first_look.scores, resolution, SECOND_LOOK_PLACES)]
     second_look = verify(poses, beams, fields)
     ranked = distinct_places(poses, second_look.scores, resolution, config.hypotheses)
-    poses = poses[ranked[: _worth_listing(second_look.scores[ranked], len(beams))]]
+    poses = poses[ranked[: worth_listing(second_look.scores[ranked], len(beams))]]
     on_rays, covariances = refine_on_rays(poses, beams, fields)
     # Rays are sharper, but in a map with smeared walls they can do harm: the better pose stays.
     poses = np.concatenate([on_rays, poses])
@@ -177,10 +177,24 @@ def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateRe
     return LocateResult(verdict, reason, hypotheses, report, time.perf_counter() - started)
 
 
-def _worth_listing(scores: NDArray[np.float64], beams: int) -> int:
+def worth_listing(scores: NDArray[np.float64], beams: int) -> int:
+    """Return how many of some ranked places a result should list.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (n,)
+        Mean cost of a beam at each place, best first, nats.
+    beams : int
+        Number of beams behind each mean.
+
+    Returns
+    -------
+    int
+        `LISTED_PLACES`, or more if more are a hundredth as likely as the best.
+    """
     probabilities = place_probabilities(scores, beams)
-    rivals = int(np.count_nonzero(probabilities >= _RIVAL_SHARE * probabilities[0]))
-    return max(_LISTED_PLACES, rivals)
+    rivals = int(np.count_nonzero(probabilities >= RIVAL_SHARE * probabilities[0]))
+    return max(LISTED_PLACES, rivals)
 
 
 def _judge(

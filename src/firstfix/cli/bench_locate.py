@@ -1,0 +1,83 @@
+"""``firstfix bench CASES``: every scan of every case is located and compared with the truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from firstfix.cli.progress import progress
+from firstfix.cli.targets import check_targets, write_json
+from firstfix.global_localization.config import Method
+
+if TYPE_CHECKING:
+    from firstfix.evaluation.bench import CaseTask, ForeignTask
+    from firstfix.evaluation.runs import CaseRun, ForeignRun
+
+
+def bench_locate(
+    cases: list[Path],
+    methods: list[Method],
+    *,
+    foreign: bool,
+    jobs: int,
+    limit: int,
+    json_file: Path | None,
+    report: Path | None,
+) -> None:
+    """Locate scans of cases.
+
+    Parameters
+    ----------
+    cases : list of Path
+        Folders of cases, or of folders of cases.
+    methods : list of Method
+        At least one, each once.
+    foreign : bool
+        Whether scans are also tried on the map of another building.
+    jobs : int
+        Cases at a time.
+    limit : int
+        Scans of a case, evenly spaced; 0 tries all.
+    json_file : Path or None
+        Where all figures go.
+    report : Path or None
+        Folder of a report.
+
+    Raises
+    ------
+    InputError
+        If a case cannot be used.
+    """
+    from firstfix.cli.cases import find_cases
+    from firstfix.evaluation import bench as runner
+    from firstfix.evaluation.document import bench_document
+    from firstfix.evaluation.runs import CaseRun, ForeignRun
+    from firstfix.evaluation.tables import bench_table, foreign_table
+
+    found = find_cases(cases)
+    check_targets(json_file, report)
+    tasks: list[CaseTask | ForeignTask] = [*runner.case_tasks(found, methods, limit)]
+    if foreign:
+        tasks += runner.foreign_tasks(found, methods, limit)
+    with progress(len(tasks), "bench") as done:
+        runs = runner.run_tasks(tasks, jobs, lambda run: done(_told(run)))
+    own = [run for run in runs if isinstance(run, CaseRun)]
+    others = [run for run in runs if isinstance(run, ForeignRun)]
+    document = bench_document(own, others, methods)
+    typer.echo(bench_table(document), nl=False)
+    if foreign:
+        typer.echo("\n" + foreign_table(document), nl=False)
+        if not others:
+            typer.echo("note: no two cases have different sites; nothing foreign tried", err=True)
+    if json_file is not None:
+        write_json(document, json_file)
+    if report is not None:
+        from firstfix.evaluation.report import write_report
+
+        typer.echo(f"report: {write_report(own, document, report)}", err=True)
+
+
+def _told(run: CaseRun | ForeignRun) -> str:
+    return f"{run.case}, {run.method.value}"
