@@ -35,6 +35,8 @@ _MESSAGE_BYTES = 16 * 1024
 _LAST_WORDS_S = 2
 # A viewer who takes nothing for so long is gone, whatever its network still says.
 _SILENT_MS = 60_000
+# What waits in the system for a slow viewer is old when it comes: half a second of frames at most.
+_SEND_BUFFER = 128 * 1024
 
 
 def make_app(page: Page) -> ASGIApp:
@@ -105,6 +107,7 @@ def listen(host: str, port: int) -> socket.socket:
             received=_why(error),
             remedy="choose another --port or --host, or end what listens there",
         ) from error
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
     if hasattr(socket, "TCP_USER_TIMEOUT"):
         listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _SILENT_MS)
     return listening
