@@ -96,6 +96,7 @@ class PoseMemory:
         """Save the last pose, if it still holds, and wait until that is done."""
         if self._keeper is not None and self._last is not None:
             self._save(self._keeper, self._last)
+            self._last = None
         self._disk.shutdown()
         self._is_disk_idle()
 
