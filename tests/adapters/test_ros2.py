@@ -2,6 +2,7 @@
 
 import math
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -115,6 +116,17 @@ def test_what_is_latched_is_heard_before_it_is_active(lab: Lab, hall_plan: Occup
     wait_until(lambda: any("SEARCHING" in line.upper() for line in lab.world.lines("info")))
 
 
+def test_only_an_active_node_misses_scans(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firstfix.adapters.node._LOOK_S", 0.05)
+    node = lab.node()
+    node.trigger_configure()
+    (worker,) = [thread for thread in threading.enumerate() if thread.name == "firstfix"]
+    worker.join(0.5)
+    assert not lab.world.lines("warning")
+    node.trigger_activate()
+    wait_until(lambda: any("nothing heard on scan" in w for w in lab.world.lines("warning")))
+
+
 def test_all_is_given_back_and_it_can_be_configured_anew(
     lab: Lab, hall_plan: OccupancyGrid
 ) -> None:
@@ -145,6 +157,7 @@ def test_all_is_given_back_and_it_can_be_configured_anew(
         ("base_frame_id:=7", "base_frame_id"),
         ("initial_pose.x:=here", "initial_pose.x"),
         ("yaml_filename:=nowhere.yaml", "nowhere.yaml"),
+        ("scan_topic:=front scan", "front scan"),
     ],
 )
 def test_a_bad_parameter_is_told_in_one_line(lab: Lab, given: str, words: str) -> None:

@@ -64,7 +64,7 @@ class Node:
         self._localizer = Localizer(LocalizerConfig(amcl=config.amcl), cache_folder())
         self._said_at: dict[str, float] = {}
         self._heard: set[Heard] = set()
-        self._looked_at = math.inf
+        self.misses_since = math.inf  # when topics were last missed; inf: nobody passes them on
         self._own_map: NewMap | None = None
         self._worker = threading.Thread(target=self._work, name="firstfix", daemon=True)
 
@@ -80,6 +80,7 @@ class Node:
             grid = load_map(Path(self._config.yaml_filename))
             check_searchable(grid)
             self._own_map = NewMap(0.0, grid)
+        self.misses_since = time.monotonic()
         self._worker.start()
 
     def stop(self) -> None:
@@ -131,10 +132,9 @@ class Node:
 
     def _work(self) -> None:
         self._try(self._make_ready)
-        self._looked_at = time.monotonic()
         while not self._inbox.is_closed:
             self._take_all(self._inbox.take(_LOOK_S))
-            if time.monotonic() - self._looked_at >= _LOOK_S:
+            if time.monotonic() - self.misses_since >= _LOOK_S:
                 self._say_what_is_missing()
         self._try(self._memory.close)
 
@@ -186,7 +186,7 @@ class Node:
 
     def _say_what_is_missing(self) -> None:
         """Name the topics that were silent since the last look; whether others spoke or not."""
-        self._looked_at = time.monotonic()
+        self.misses_since = time.monotonic()
         topics = heard_topics(self._config)
         for heard in (Heard.MAP, Heard.SCAN):
             if heard in topics and heard not in self._heard:

@@ -6,7 +6,7 @@ import traceback
 
 import rclpy
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.exceptions import InvalidParameterValueException
+from rclpy.exceptions import InvalidParameterValueException, NameValidationException
 from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.utilities import remove_ros_args
@@ -47,7 +47,7 @@ class Ros2Node(LifecycleNode):
             config = configured({name: self.get_parameter(name).value for name in names})
             self._transport = Ros2(self, config)
             self._transport.start(self._make_node(config, self._transport))
-        except InputError as error:
+        except (InputError, NameValidationException) as error:
             self.end()
             self.get_logger().error(" ".join(str(error).split()))
             return TransitionCallbackReturn.FAILURE
@@ -60,13 +60,13 @@ class Ros2Node(LifecycleNode):
         """Speak and hear."""
         result = super().on_activate(state)
         if self._transport is not None:
-            self._transport.is_active = True
+            self._transport.activate()
         return result
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Be silent and deaf; what is known stays known."""
         if self._transport is not None:
-            self._transport.is_active = False
+            self._transport.deactivate()
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:

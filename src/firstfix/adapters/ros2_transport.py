@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from functools import partial
 from typing import Any
 
@@ -43,7 +45,7 @@ class Ros2:
         self._owner = owner
         self._config = config
         self._node: Node | None = None
-        self.is_active = False
+        self._is_active = False
         self.particles = PARTICLES if find("msg", PARTICLES.type_name) else PARTICLE_POSES
         kinds = {t: find("msg", t.type_name) for t in said_topics(config, self.particles)}
         self._publishers = {
@@ -63,6 +65,7 @@ class Ros2:
         """
         node.start()
         self._node = node
+        self.deactivate()
         for heard, topic in heard_topics(self._config).items():
             if (kind := self._find("msg", topic.type_name, topic.name)) is not None:
                 hear = partial(self._hear, node, heard, topic)
@@ -73,9 +76,21 @@ class Ros2:
                 answer = partial(self._answer, node, heard, name)
                 self._services.append(self._owner.create_service(kind, name, answer))
 
+    def activate(self) -> None:
+        """Pass on what is heard."""
+        self._is_active = True
+        if self._node is not None:
+            self._node.misses_since = time.monotonic()
+
+    def deactivate(self) -> None:
+        """Pass on only what is latched."""
+        self._is_active = False
+        if self._node is not None:
+            self._node.misses_since = math.inf
+
     def close(self) -> None:
         """Let the node end, and give back all that was made."""
-        self.is_active = False
+        self._is_active = False
         if self._node is not None:
             self._node.stop()
         publishers, self._publishers = self._publishers, {}
@@ -123,11 +138,11 @@ class Ros2:
 
     def _hear(self, node: Node, heard: Heard, topic: Topic, message: Any) -> None:
         # What is latched comes once: who ignored it before being active would never have it.
-        if self.is_active or topic.delivery in LATCHED:
+        if self._is_active or topic.delivery in LATCHED:
             node.hear(heard, message)
 
     def _answer(self, node: Node, heard: Heard, name: str, request: Any, response: Any) -> Any:
-        if self.is_active:
+        if self._is_active:
             node.hear(heard, getattr(request, "pose", None))
         else:
             self.log(Gravity.WARNING, f"{name} has no effect: firstfix is not active")

@@ -1,4 +1,12 @@
-"""What parameters can be wrong with."""
+"""What names and parameters can be wrong with."""
+
+
+class NameValidationException(Exception):
+    """Of all names."""
+
+
+class InvalidTopicNameException(NameValidationException):
+    """Of topics."""
 
 
 class ParameterException(Exception):

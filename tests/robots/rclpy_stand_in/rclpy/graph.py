@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+_NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*")
 
 
 class RCLError(RuntimeError):
@@ -63,6 +67,8 @@ class World:
     def join(self, end: End) -> End:
         """Connect an end; a late subscription gets what is kept for it."""
         name = self.arguments.remappings.get(end.topic, end.topic)
+        if not _NAME.fullmatch(name):
+            raise InvalidTopicNameException(f"Invalid topic name:\n  '{name}'\n   ^")
         end.topic = name if name.startswith("/") else f"/{name}"
         self.ends.append(end)
         is_late = end.quality.durability == DurabilityPolicy.TRANSIENT_LOCAL
