@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "robots"))
 
 import dds_lab
 from recorder import Recorder
+from ros1_lab import Lab, why_missing
 
 REQUIRED = set(filter(None, os.environ.get("FIRSTFIX_REQUIRE", "").split(",")))
 
@@ -23,6 +24,17 @@ def missing(part: str, why: str) -> None:
     if part in REQUIRED:
         pytest.fail(f"FIRSTFIX_REQUIRE asks for {part}: {why}")
     pytest.skip(why)
+
+
+@pytest.fixture
+def ros1(tmp_path: Path) -> Iterator[Lab]:
+    """Give a ROS 1 whose master runs."""
+    if why := why_missing():
+        missing("ros1", why)
+    lab = Lab(tmp_path)
+    lab.master.start()
+    yield lab
+    lab.end()
 
 
 @pytest.fixture

@@ -30,10 +30,12 @@ def play(
 ) -> None:
     """Play a scenario, stamped by the wall clock, and write the true pose of each scan.
 
-    A line of the file is ``[stamp, x, y, yaw]``.
+    A line of the file is ``[stamp, x, y, yaw]``. A robot that shall report later than now begins
+    when its scenario is ready: kernels of the simulation may have to be compiled first.
     """
+    next(run(scenario, grid, seed))
     began = time.time()
-    with truth.open("w", encoding="utf-8", buffering=1) as lines:
+    with truth.open("a", encoding="utf-8", buffering=1) as lines:
         for moment in run(scenario, grid, seed):
             for event in moment.events:
                 time.sleep(max(0.0, began + event.stamp - time.time()))

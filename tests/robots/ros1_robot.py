@@ -1,21 +1,36 @@
-"""A rospy robot from `firstfix.sim`: run as a program, with a scenario as JSON."""
+"""A rospy robot from `firstfix.sim`, run as a program; a line on its stdin tells it to change.
+
+Such a line is JSON: ``flaws`` (names of `FLAWS`, instead of those before), ``shift`` (x, y, yaw:
+the map moves by that much, the robot does not), ``ask`` (a service without arguments), ``hint``
+(x, y, yaw: a person says where the robot is), ``go`` (on with the script). After each, map and
+fixed transforms are published anew.
+"""
 
 from __future__ import annotations
 
+import argparse
+import json
 import sys
+import threading
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import genpy.dynamic
+import nav_msgs.srv
+import numpy as np
 import rospy
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 from play import BASE, LASER, play
-from scripts import SCRIPTS
+from scripts import SCRIPTS, TOLD
 
-from firstfix.adapters.ros1_types import make, message_class
-from firstfix.formats.outgoing import occupancy_grid, transforms
+from firstfix.adapters.ros1_types import Empty, make, message_class
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.se2 import SE2
+from firstfix.formats.outgoing import occupancy_grid, pose_with_covariance, transforms
 
 # As kobuki_msgs has them, less the comments.
 DEFINITIONS = {
@@ -31,6 +46,7 @@ TYPES = {
     "/tf_static": "tf2_msgs/TFMessage",
     "scan": "sensor_msgs/LaserScan",
     "map": "nav_msgs/OccupancyGrid",
+    "initialpose": "geometry_msgs/PoseWithCovarianceStamped",
     "events/cliff": "kobuki/CliffEvent",
     "events/wheel_drop": "kobuki/WheelDropEvent",
     "events/bumper": "kobuki/BumperEvent",
@@ -38,7 +54,90 @@ TYPES = {
 LATCHED = ("/tf_static", "map")
 
 
-def kind_of(name: str) -> Any:
+def _without_stamp(topic: str, message: Any) -> Any:
+    if topic == "scan":
+        message.header.stamp = rospy.Time(0)
+    return message
+
+
+def _in_another_frame(topic: str, message: Any) -> Any:
+    if topic == "map":
+        message.header.frame_id = "second_floor"
+    return message
+
+
+def _silent(silent: str) -> Callable[[str, Any], Any]:
+    return lambda topic, message: None if topic == silent else message
+
+
+# What can be wrong with a robot: from topic and message to the message that it sends, or None.
+FLAWS = {
+    "no laser frame": _silent("/tf_static"),
+    "no odometry": _silent("/tf"),
+    "no map": _silent("map"),
+    "no scan": _silent("scan"),
+    "no stamp": _without_stamp,
+    "map elsewhere": _in_another_frame,
+}
+
+
+class Robot:
+    """What a robot and the people around it publish."""
+
+    def __init__(self, grid: OccupancyGrid, T_base_laser: SE2, flaws: list[str]) -> None:
+        self._grid = grid
+        self._T_base_laser = T_base_laser
+        self._flaws = flaws
+        self._publishers = {
+            topic: rospy.Publisher(topic, _kind(kind), latch=topic in LATCHED, queue_size=50)
+            for topic, kind in TYPES.items()
+            if topic != "initialpose"  # a person comes only when there is something to say
+        }
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Publish as well as the flaws allow, until ROS ends this program."""
+        if rospy.is_shutdown():
+            sys.exit()
+        for flaw in self._flaws:
+            message = FLAWS[flaw](topic, message) if message is not None else None
+        if message is not None:
+            self._publishers[topic].publish(message)
+
+    def publish_latched(self) -> None:
+        """Publish what does not change."""
+        self.publish("/tf_static", transforms(make, 0.0, BASE, LASER, self._T_base_laser))
+        self.publish("map", self.map())
+
+    def map(self) -> Any:
+        """Return the map as a message."""
+        return occupancy_grid(make, 0.0, "map", self._grid)
+
+    def obey(self, told: dict[str, Any]) -> None:
+        """Change."""
+        self._flaws = told.get("flaws", self._flaws)
+        T_new_old = SE2(*told.get("shift", (0.0, 0.0, 0.0)))
+        self._grid = replace(self._grid, T_map_grid=T_new_old @ self._grid.T_map_grid)
+        self.publish_latched()
+        if "hint" in told:
+            self._publishers["initialpose"] = rospy.Publisher(
+                "initialpose", _kind(TYPES["initialpose"]), latch=True, queue_size=1
+            )
+            where = SE2(*told["hint"])
+            said = pose_with_covariance(make, 0.0, "map", where, np.diag([0.25, 0.25, 0.07]))
+            self._publishers["initialpose"].publish(said)
+        if "go" in told:
+            TOLD.set()
+        if "ask" in told:
+            rospy.wait_for_service(told["ask"], timeout=10.0)
+            rospy.ServiceProxy(told["ask"], Empty)()
+
+    def listen(self) -> None:
+        """Obey what comes on stdin."""
+        for line in sys.stdin:
+            self.obey(json.loads(line))
+
+
+def _kind(name: str) -> Any:
     """Return the class of a message, of a Kobuki's too."""
     package, _, short = name.partition("/")
     if package != "kobuki":
@@ -49,22 +148,25 @@ def kind_of(name: str) -> Any:
 
 def make_any(name: str, /, **fields: Any) -> Any:
     """Build a message, of a Kobuki's too."""
-    return kind_of(name)(**fields) if name.startswith("kobuki/") else make(name, **fields)
+    return _kind(name)(**fields) if name.startswith("kobuki/") else make(name, **fields)
 
 
 def main() -> None:
     """Publish the map and the place of the sensor, then play."""
-    script, truth = sys.argv[1:3]
-    rospy.init_node("robot")
-    publishers = {
-        topic: rospy.Publisher(topic, kind_of(kind), latch=topic in LATCHED, queue_size=50)
-        for topic, kind in TYPES.items()
-    }
-    grid, scenario, seed = SCRIPTS[script]()
-    T_base_laser = scenario.lidar.T_base_laser
-    publishers["/tf_static"].publish(transforms(make, 0.0, BASE, LASER, T_base_laser))
-    publishers["map"].publish(occupancy_grid(make, 0.0, "map", grid))
-    play(scenario, grid, seed, make_any, lambda t, m: publishers[t].publish(m), Path(truth))
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("script", choices=SCRIPTS)
+    parser.add_argument("truth", type=Path)
+    parser.add_argument("--flaws", nargs="*", choices=FLAWS, default=[])
+    parser.add_argument("--serve-map", action="store_true", help="as the service static_map")
+    arguments = parser.parse_args()
+    rospy.init_node("robot", anonymous=True)
+    grid, scenario, seed = SCRIPTS[arguments.script]()
+    robot = Robot(grid, scenario.lidar.T_base_laser, arguments.flaws)
+    if arguments.serve_map:
+        rospy.Service("static_map", nav_msgs.srv.GetMap, lambda _: robot.map())
+    robot.publish_latched()
+    threading.Thread(target=robot.listen, daemon=True).start()
+    play(scenario, grid, seed, make_any, robot.publish, arguments.truth)
 
 
 if __name__ == "__main__":

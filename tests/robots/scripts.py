@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from firstfix.core.grid import OccupancyGrid
-from firstfix.sim.phases import CarryTo, DriveTo, Stand
+from firstfix.sim.phases import CarryTo, DriveTo, Phase, Stand
 from firstfix.sim.scenario import Scenario
+from firstfix.sim.stage import Moment, Stage
 from firstfix.sim.world import WORLDS, identical_rooms
 
 Script = Callable[[], tuple[OccupancyGrid, Scenario, int]]
 
+TOLD = threading.Event()
+"""Set when a test tells its robot to go on."""
+
+
+@dataclass(frozen=True, slots=True)
+class StandUntilTold(Phase):
+    """Stand still: what follows shall not begin before the test has seen what it waits for."""
+
+    def play(self, stage: Stage) -> Iterator[Moment]:
+        """Stand."""
+        while not TOLD.is_set():
+            yield stage.moment("stand")
+
 
 def stand() -> tuple[OccupancyGrid, Scenario, int]:
     """Stand still in an office."""
-    return WORLDS["office"](), Scenario((Stand(60.0),)), 1
+    return WORLDS["office"](), Scenario((Stand(900.0),)), 1
 
 
 def drive() -> tuple[OccupancyGrid, Scenario, int]:
@@ -28,14 +44,21 @@ def kidnapped() -> tuple[OccupancyGrid, Scenario, int]:
     return WORLDS["office"](), Scenario(phases), 3
 
 
+def carried() -> tuple[OccupancyGrid, Scenario, int]:
+    """Be carried away when the test says so, with all that a Kobuki notices of that."""
+    phases = (StandUntilTold(), CarryTo(seconds=3.0), Stand(900.0))
+    return WORLDS["office"](), Scenario(phases), 3
+
+
 def twins() -> tuple[OccupancyGrid, Scenario, int]:
     """Stand in one of four equal rooms."""
-    return identical_rooms(4), Scenario((Stand(60.0),)), 4
+    return identical_rooms(4), Scenario((Stand(900.0),)), 4
 
 
 SCRIPTS: dict[str, Script] = {
     "stand": stand,
     "drive": drive,
     "kidnapped": kidnapped,
+    "carried": carried,
     "twins": twins,
 }

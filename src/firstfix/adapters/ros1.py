@@ -12,7 +12,7 @@ from rospy.numpy_msg import numpy_msg
 
 from firstfix.adapters.node import MakeNode, Node
 from firstfix.adapters.parameters import configured, flattened
-from firstfix.adapters.ros1_master import is_forgotten, register_anew
+from firstfix.adapters.ros1_master import is_forgotten, register_anew, wait_for_master
 from firstfix.adapters.ros1_types import Empty, decoded, make, message_class
 from firstfix.adapters.topics import (
     PARTICLE_POSES,
@@ -94,9 +94,9 @@ def run(arguments: list[str], make_node: MakeNode = Node) -> None:
     InputError
         If a parameter cannot be used.
     """
-    if not _has_begun(arguments):
+    if not wait_for_master():
         return
-    values = flattened(rospy.get_param("~", {}))
+    values = flattened(_begin(arguments))
     uses_topic = _switch("use_map_topic", values.pop("use_map_topic", True))
     config = configured(values)
     node = make_node(config, Ros1(config))
@@ -113,19 +113,19 @@ def run(arguments: list[str], make_node: MakeNode = Node) -> None:
     node.stop()
 
 
-def _has_begun(arguments: list[str]) -> bool:
-    """Register with the master; false if the end came while there was none."""
+def _begin(arguments: list[str]) -> Any:
+    """Register with the master, and return the private parameters."""
     try:
         rospy.init_node("firstfix", argv=["firstfix", *arguments])
-    except rospy.ROSInitException as error:
+        return rospy.get_param("~", {})
+    except (rospy.ROSException, OSError) as error:
         if rospy.is_shutdown():
-            return False
+            raise SystemExit(0) from None
         raise InputError(
             expected="a node that ROS can start",
             received=str(error),
             remedy="look at ROS_MASTER_URI, ROS_IP and the arguments",
         ) from error
-    return True
 
 
 def _spin(services: list[rospy.Service]) -> None:

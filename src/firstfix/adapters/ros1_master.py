@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import http.client
+import sys
+import time
 import xmlrpc.client
 from collections.abc import Sequence
 from typing import Any
@@ -10,8 +12,29 @@ from typing import Any
 import rosgraph
 import rospy
 
+_ASK_AGAIN_S = 0.3
+
 # What a master can do to its callers: be away, be about to begin, say no, or talk nonsense.
 _ABSENT = (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
+
+
+def wait_for_master() -> bool:
+    """Wait until there is a master: without one, rospy cannot take parameters of its arguments.
+
+    Returns
+    -------
+    bool
+        False if a person got tired of it.
+    """
+    try:
+        if not rosgraph.is_master_online():
+            uri = rosgraph.get_master_uri()
+            sys.stderr.write(f"firstfix: waiting for the ROS master at {uri}\n")
+        while not rosgraph.is_master_online():
+            time.sleep(_ASK_AGAIN_S)
+    except KeyboardInterrupt:
+        return False
+    return True
 
 
 def is_forgotten() -> bool:

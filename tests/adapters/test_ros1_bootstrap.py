@@ -1,0 +1,102 @@
+"""`firstfix ros1` beside an AMCL, on a real master: it hands over a pose, once."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+from ros1_lab import Lab, wait_until
+
+pytestmark = pytest.mark.slow
+
+# Long enough for some more scans to do harm.
+A_WHILE_S = 2.0
+
+
+def test_a_robot_at_rest_is_found_once(ros1: Lab) -> None:
+    watcher = ros1.watch("initialpose", "amcl_pose", "localization_status", "/tf")
+    ros1.node()
+    ros1.robot("stand")
+    found = watcher.wait_for("initialpose")
+    metres, degrees = ros1.error_of(found)
+    assert (metres, degrees) < (0.2, 3.0)
+    assert degrees < 3.0
+    assert found["frame"] == "map"
+    told = watcher.wait_for("localization_status", state="LOCALIZED")
+    assert (told["level"], told["mode"]) == (0, "bootstrap")
+    time.sleep(A_WHILE_S)
+    assert len(watcher.lines("initialpose")) == 1
+    assert not watcher.lines("amcl_pose")
+    assert not watcher.lines("/tf", frames=["map", "odom"])
+
+
+def test_an_amcl_that_comes_late_gets_the_pose_of_now(ros1: Lab) -> None:
+    first = ros1.watch("initialpose", "localization_status")
+    ros1.node()
+    ros1.robot("stand")
+    found = first.wait_for("initialpose")
+    for _ in range(2):
+        late = ros1.watch("initialpose", "localization_status")
+        now = late.wait_for("initialpose")
+        assert now["stamp"] > found["stamp"]
+        assert ros1.error_of(now) < (0.2, 3.0)
+        assert late.wait_for("localization_status")["state"] == "LOCALIZED"
+        late.end()
+
+
+def test_places_that_look_alike_are_told_instead_of_a_pose(ros1: Lab) -> None:
+    watcher = ros1.watch("initialpose", "hypotheses", "localization_status")
+    ros1.node()
+    robot = ros1.robot("twins")
+    told = watcher.wait_for("localization_status", state="TRACKING")
+    assert told["level"] == 1
+    assert "motion would tell" in told["message"]
+    assert len(watcher.wait_for("hypotheses")["places"]) == int(told["hypotheses"]) > 1
+    time.sleep(A_WHILE_S)
+    assert not watcher.lines("initialpose")
+
+    # The last hypotheses are there for viewers that come late.
+    late = ros1.watch("hypotheses").wait_for("hypotheses")
+    truth = ros1.truth_at(late["stamp"])
+    x, y = min(late["places"], key=lambda place: abs(place[0] - truth.x) + abs(place[1] - truth.y))
+    assert abs(x - truth.x) + abs(y - truth.y) < 0.2
+
+    robot.tell(hint=[truth.x + 0.2, truth.y - 0.2, truth.yaw + 0.2])
+    said = watcher.wait_for("localization_status", state="LOCALIZED")
+    assert "a person said where" in said["message"]
+    handed_over = wait_until(
+        lambda: watcher.lines("initialpose")[1:], lambda: "only what the person said"
+    )[0]
+    assert ros1.error_of(handed_over) < (0.2, 3.0)
+    # The places that were left are gone.
+    wait_until(lambda: not watcher.lines("hypotheses")[-1]["places"], lambda: "places stay")
+
+
+def test_the_same_map_again_changes_nothing_and_another_is_searched(ros1: Lab) -> None:
+    watcher = ros1.watch("initialpose", "localization_status")
+    node = ros1.node()
+    robot = ros1.robot("stand")
+    watcher.wait_for("localization_status", state="LOCALIZED")
+    robot.tell()
+    time.sleep(A_WHILE_S)
+    assert len(watcher.lines("initialpose")) == 1
+    assert node.said.count("SEARCHING") == 1
+
+    since = time.time()
+    robot.tell(shift=[10.0, -5.0, 1.5])
+    elsewhere = watcher.wait_for("initialpose", after=since)
+    assert ros1.error_of(elsewhere)[0] > 1.0
+    since = time.time()
+    robot.tell(shift=[-10.0, 5.0, 0.0])
+
+
+def test_services_search_anew(ros1: Lab) -> None:
+    watcher = ros1.watch("initialpose", "localization_status")
+    ros1.node()
+    robot = ros1.robot("stand")
+    watcher.wait_for("localization_status", state="LOCALIZED")
+    for name in ("reinitialize_global_localization", "global_localization"):
+        since = time.time()
+        robot.tell(ask=name)
+        assert watcher.wait_for("localization_status", since, state="SEARCHING")["level"] == 1
+        assert ros1.error_of(watcher.wait_for("initialpose", since)) < (0.2, 3.0)

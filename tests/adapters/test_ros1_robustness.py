@@ -1,0 +1,131 @@
+"""`firstfix ros1` where something is wrong, on a real master: it says so, goes on, ends well."""
+
+from __future__ import annotations
+
+import signal
+import time
+
+import pytest
+from ros1_lab import Lab, wait_until
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("flaw", "warning"),
+    [
+        ("no laser frame", "the place of the laser is not known: no transform tells of laser"),
+        ("no odometry", "odometry (odom -> base_footprint) is not known: no transform tells"),
+        ("no stamp", "a scan has no stamp"),
+        ("no map", "nothing heard on map (nav_msgs/OccupancyGrid)"),
+        ("no scan", "nothing heard on scan (sensor_msgs/LaserScan)"),
+    ],
+)
+def test_what_is_missing_is_said_once_and_waited_for(ros1: Lab, flaw: str, warning: str) -> None:
+    watcher = ros1.watch("initialpose")
+    node = ros1.node()
+    robot = ros1.robot("stand", "--flaws", flaw)
+    node.wait_to_say(warning)
+    time.sleep(2.0)
+    assert node.said.count(warning) == 1
+    assert not watcher.lines("initialpose")
+    robot.tell(flaws=[])
+    assert ros1.error_of(watcher.wait_for("initialpose")) < (0.2, 3.0)
+    assert "Traceback" not in node.said
+
+
+def test_a_base_frame_that_no_transform_tells_of_is_named_with_those_there_are(ros1: Lab) -> None:
+    node = ros1.node("_base_frame_id:=base_lynk")
+    ros1.robot("stand")
+    node.wait_to_say("no transform tells of base_lynk; there are: base_footprint, laser, odom")
+    time.sleep(2.0)
+    assert node.said.count("[WARN]") <= 2  # the laser may have been heard of first
+    node.send(signal.SIGINT)
+    assert node.wait() == 0
+
+
+def test_a_map_in_another_frame_is_used_with_a_warning(ros1: Lab) -> None:
+    watcher = ros1.watch("initialpose")
+    node = ros1.node()
+    ros1.robot("stand", "--flaws", "map elsewhere")
+    assert watcher.wait_for("initialpose")["frame"] == "map"
+    assert node.said.count("the map is in 'second_floor', not in 'map': used as is") == 1
+
+
+def test_a_node_that_was_killed_finds_the_robot_again_and_signals_end_it_well(ros1: Lab) -> None:
+    watcher = ros1.watch("initialpose")
+    node = ros1.node()
+    ros1.robot("stand")
+    watcher.wait_for("initialpose")
+    node.send(signal.SIGKILL)
+    node.wait()
+    for how in (signal.SIGINT, signal.SIGTERM):
+        since = time.time()
+        node = ros1.node()
+        assert ros1.error_of(watcher.wait_for("initialpose", since)) < (0.2, 3.0)
+        node.send(how)
+        assert node.wait() == 0
+        assert "Traceback" not in node.said
+
+
+def test_a_node_ends_well_before_it_is_ready(ros1: Lab) -> None:
+    node = ros1.node("_mode:=full")
+    wait_until(lambda: ros1.master.publishers("/amcl_pose"), lambda: node.said)
+    node.send(signal.SIGINT)
+    assert node.wait() == 0
+    assert "Traceback" not in node.said
+
+
+def test_another_master_is_told_everything_anew(ros1: Lab) -> None:
+    ros1.master.end()
+    watcher = ros1.watch("amcl_pose")
+    node = ros1.node("_mode:=full")
+    robot = ros1.robot("stand")
+    node.wait_to_say("waiting for the ROS master")
+    ros1.master.start()
+    watcher.wait_for("amcl_pose")
+
+    ros1.master.end()
+    gone = time.time()
+    # What is connected stays so.
+    watcher.wait_for("amcl_pose", after=gone + 1.0)
+    ros1.master.start()
+    node.wait_to_say("the master was restarted: registering anew")
+    for topic in ("/amcl_pose", "/localization_status", "/rosout"):
+        wait_until(lambda topic=topic: ros1.master.publishers(topic), lambda: node.said)
+    back = time.time()
+    assert watcher.wait_for("amcl_pose", after=back)
+
+    # The old robot is gone, and comes back by the new master; so do viewers and services.
+    robot.end()
+    again = ros1.watch("amcl_pose", "localization_status", "/rosout_agg")
+    since = time.time()
+    robot = ros1.robot("stand")
+    assert ros1.error_of(again.wait_for("amcl_pose", about_after=since)) < (0.2, 3.0)
+    robot.tell(ask="reinitialize_global_localization")
+    lost = again.wait_for("localization_status", about_after=since, state="SEARCHING")
+    again.wait_for("localization_status", about_after=lost["stamp"], state="LOCALIZED")
+    again.wait_for("/rosout_agg", after=since, node="/firstfix")
+    assert "Traceback" not in node.said
+
+
+@pytest.mark.parametrize(
+    ("argument", "expected"),
+    [
+        ("_mode:=nonsense", "mode as one of bootstrap, full"),
+        ("_pf_err:=-1", "pf_err"),
+        ("_laser_max_beams:=30", "Nav2 calls it max_beams"),
+        ("_base_frame:=base_link", "the nearest is base_frame_id"),
+        ("_use_map_topic:=perhaps", "use_map_topic as true or false"),
+        ("_yaml_filename:=/nowhere/map.yaml", "/nowhere/map.yaml"),
+    ],
+)
+def test_a_parameter_that_cannot_be_used_ends_the_node_with_a_sentence(
+    ros1: Lab, argument: str, expected: str
+) -> None:
+    node = ros1.node(argument)
+    assert node.wait() == 2
+    said = [line for line in node.said.splitlines() if "waiting for the ROS master" not in line]
+    assert len(said) == 1
+    assert said[0].startswith("firstfix: ")
+    assert expected in said[0]
