@@ -18,6 +18,7 @@ from firstfix.core.estimate import Evidence, Hypothesis, Verdict
 from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
 from firstfix.global_localization.locate import Locator
 from firstfix.system.candidate import Candidates, moved_on, same_place
 from firstfix.system.config import LocalizerConfig
@@ -239,6 +240,9 @@ class Localizer:
         return self._tell_places(scan, reason)
 
     def _check_hint(self, scan: LaserScan, T_odom_base: SE2, hint: PoseHint) -> list[Output]:
+        if np.count_nonzero(usable_beams(scan).hit) < FEWEST_HITS:
+            reason = f"{hint.source} says where; the sensor sees too little to tell"
+            return [Status(scan.stamp, self.state, reason)]
         self._hint = None
         place = self._locator.locate_near(scan, hint.T_map_base)
         result = self._locator.locate(scan)
