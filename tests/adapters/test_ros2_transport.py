@@ -65,15 +65,18 @@ def test_an_update_can_be_asked_for(lab: Lab, states) -> None:
     assert {state_of(m) for m in heard} == {"LOCALIZED"}
 
 
-def test_a_pose_can_be_set_by_service(lab: Lab, states) -> None:
+@pytest.mark.parametrize("way", ["service", "topic"])
+def test_a_person_can_say_where_it_is(lab: Lab, states, way: str) -> None:
     robot, _ = states
     told = lab.hears("initialpose", POSE)
     robot.T_map_base = ELSEWHERE
-    request = lab.types.find("srv", "nav2_msgs/SetInitialPose").Request()
-    covariance = 0.01 * np.eye(3)
-    request.pose = pose_with_covariance(robot.make, robot.stamp, "map", ELSEWHERE, covariance)
-    lab.world.ask("set_initial_pose", request)
-    robot.look_until(lambda: any(is_there(message) for message in told))
+    hint = pose_with_covariance(robot.make, robot.stamp, "map", ELSEWHERE, 0.01 * np.eye(3))
+    if way == "service":
+        request = lab.types.find("srv", "nav2_msgs/SetInitialPose").Request(pose=hint)
+        lab.world.ask("set_initial_pose", request)
+    else:
+        lab.says("initialpose", POSE).publish(hint)
+    robot.look_until(lambda: any(message is not hint and is_there(message) for message in told))
 
 
 def test_a_wheel_that_drops_makes_it_search(lab: Lab, states) -> None:
