@@ -1,0 +1,254 @@
+"""The live page in a real browser: the server as users start it, and a Chromium that visits it."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import json
+import math
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request
+
+# In a fresh checkout kernels are compiled first.
+PATIENCE_S = 240.0
+# What a simulated robot needs to be carried away, set down and found.
+STORY_S = 60.0
+_POLL_S = 0.05
+_KINDNESS_S = 10.0
+
+DESKTOP: dict[str, Any] = {"viewport": {"width": 1280, "height": 800}}
+PHONE: dict[str, Any] = {
+    "viewport": {"width": 360, "height": 740},
+    "device_scale_factor": 3,
+    "is_mobile": True,
+    "has_touch": True,
+}
+
+
+def browser_path() -> str | None:
+    """Return where a Chromium is."""
+    return shutil.which("chromium", path="/usr/bin") or shutil.which("chromium")
+
+
+def why_missing() -> str:
+    """Say what a visit needs and this machine lacks; empty for nothing."""
+    for package in ("playwright", "axe_playwright_python"):
+        if importlib.util.find_spec(package) is None:
+            return f"no {package} in {sys.executable}"
+    return "" if browser_path() else "no chromium in PATH"
+
+
+def wait_until(
+    condition: Callable[[], Any], what: Callable[[], str], seconds: float = STORY_S
+) -> Any:
+    """Wait for something true, and return it; fail with `what` where it does not come."""
+    deadline = time.monotonic() + seconds
+    while not (found := condition()):
+        assert time.monotonic() < deadline, f"not within {seconds:g} s: {what()}"
+        time.sleep(_POLL_S)
+    return found
+
+
+class Server:
+    """`firstfix serve` in a process of its own.
+
+    Parameters
+    ----------
+    *arguments : str
+        After `serve`.
+    """
+
+    def __init__(self, *arguments: str) -> None:
+        self._arguments = arguments
+        self._port = 0
+        self._process: subprocess.Popen[str] | None = None
+        self.url = ""
+
+    def start(self) -> Server:
+        """Start it, where it was before if it was; return when it says where it is."""
+        command = [sys.executable, "-m", "firstfix", "serve", *self._arguments]
+        self._process = subprocess.Popen(
+            [*command, "--port", str(self._port)], stdout=subprocess.PIPE, text=True
+        )
+        assert self._process.stdout is not None
+        lines = []
+        for line in self._process.stdout:
+            lines.append(line)
+            if found := re.search(r"http://[^\s#]+", line):
+                self.url = found.group()
+                self._port = urlsplit(self.url).port or 0
+                return self
+        raise AssertionError(f"the server ended: {lines}")
+
+    def kill(self) -> None:
+        """End it without a word."""
+        self._end(signal.SIGKILL)
+
+    def stop(self) -> None:
+        """End it as a user does."""
+        if self._process is not None:
+            self._end(signal.SIGINT)
+
+    def _end(self, how: signal.Signals) -> None:
+        assert self._process is not None
+        self._process.send_signal(how)
+        try:
+            self._process.wait(_KINDNESS_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+        self._process = None
+
+    def status(self) -> dict[str, Any]:
+        """Ask where the robot is."""
+        with urllib.request.urlopen(self.url + "v1/status") as answer:  # noqa: S310 - our own
+            status: dict[str, Any] = json.load(answer)
+        return status
+
+
+@contextlib.contextmanager
+def chromium() -> Iterator[Browser]:
+    """Run a browser without a window."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=browser_path(), args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+class Visit:
+    """A page in a browser, and what went wrong on it.
+
+    Parameters
+    ----------
+    context : BrowserContext
+        Of the browser.
+    url : str
+        Where to go.
+    """
+
+    def __init__(self, context: BrowserContext, url: str) -> None:
+        self.problems: list[str] = []
+        self._host = urlsplit(url).hostname
+        self.page: Page = context.new_page()
+        self.page.on("console", self._hear)
+        self.page.on("pageerror", lambda error: self.problems.append(f"error: {error}"))
+        self.page.on("request", self._see)
+        self.page.goto(url)
+
+    def _hear(self, message: ConsoleMessage) -> None:
+        if message.type in {"error", "warning"}:
+            self.problems.append(f"{message.type}: {message.text}")
+
+    def _see(self, request: Request) -> None:
+        address = urlsplit(request.url)
+        if address.scheme not in {"blob", "data"} and address.hostname != self._host:
+            self.problems.append(f"asks for {request.url}")
+
+    # ---- what the page says
+
+    def data(self, name: str) -> str:
+        """Return what the page says of itself."""
+        return self.page.get_attribute("#app", f"data-{name}") or ""
+
+    def pose(self, name: str = "pose") -> tuple[float, ...]:
+        """Return the pose it shows (or the ``truth``): x, y, yaw; empty for none."""
+        return tuple(float(value) for value in self.data(name).split())
+
+    def wait_for_state(self, *states: str, seconds: float = STORY_S) -> None:
+        """Wait until the robot is in one of these states."""
+        wait_until(
+            lambda: self.data("state") in states,
+            lambda: f"{states}, but {self.data('state')}; {self.events()[:5]}",
+            seconds,
+        )
+
+    def wait_for_map(self) -> None:
+        """Wait until there is something to see."""
+        self.page.wait_for_selector("#app[data-map]")
+        wait_until(lambda: self.data("view"), lambda: "a frame was drawn")
+
+    def events(self) -> list[str]:
+        """Return the timeline, newest first."""
+        return self.page.locator("#events li span").all_inner_texts()
+
+    def wait_for_event(self, pattern: str, among: int = 1000) -> re.Match[str]:
+        """Wait for an event, and return what matched."""
+
+        def found() -> re.Match[str] | None:
+            texts = self.events()[:among]
+            return next(filter(None, (re.search(pattern, text) for text in texts)), None)
+
+        match: re.Match[str] = wait_until(found, lambda: f"{pattern}; {self.events()[:8]}")
+        return match
+
+    # ---- the map
+
+    @property
+    def scale(self) -> float:
+        """Return how large the map is, pixels per metre."""
+        return float(self.data("view").split()[0])
+
+    def zoom_in(self, times: int) -> None:
+        """Zoom in on the middle of the map by the key for it."""
+        for _ in range(times):
+            scale = self.scale
+            self.page.keyboard.press("+")
+            wait_until(lambda: self.scale > scale, lambda: "it zooms")  # noqa: B023 - used at once
+
+    def sees(self, x: float, y: float) -> bool:
+        """Tell whether a place of the map is visible, beside all bars and panels."""
+        px, py = self.pixel(x, y)
+        found = "([px, py]) => document.elementFromPoint(px, py)?.id === 'overlay'"
+        return bool(self.page.evaluate(found, [px, py]))
+
+    def pixel(self, x: float, y: float) -> tuple[float, float]:
+        """Return where a place of the map is in the window."""
+        scale, centre_x, centre_y, u, v = (float(value) for value in self.data("view").split())
+        return u + (x - centre_x) * scale, v - (y - centre_y) * scale
+
+    def press_and_pull(self, x: float, y: float, yaw: float, length_px: float = 60.0) -> None:
+        """Press at a place of the map and pull in a direction."""
+        px, py = self.pixel(x, y)
+        mouse = self.page.mouse
+        mouse.move(px, py)
+        mouse.down()
+        for step in (0.3, 0.7, 1.0):
+            reach = length_px * step
+            mouse.move(px + reach * math.cos(yaw), py - reach * math.sin(yaw))
+        mouse.up()
+
+    def click_on_map(self, x: float, y: float) -> None:
+        """Click a place of the map."""
+        self.page.mouse.click(*self.pixel(x, y))
+
+    def colour(self, canvas: str, x: float, y: float) -> tuple[int, ...]:
+        """Return the colour (r, g, b, a) of a canvas at a place of the map."""
+        # Through a copy: what is read often is not drawn fast any more, and the browser says so.
+        script = """([canvas, px, py]) => {
+            const found = document.getElementById(canvas);
+            const ratio = found.width / found.clientWidth;
+            const copy = new OffscreenCanvas(1, 1).getContext("2d");
+            copy.drawImage(found, -Math.floor(px * ratio), -Math.floor(py * ratio));
+            return [...copy.getImageData(0, 0, 1, 1).data];
+        }"""
+        return tuple(self.page.evaluate(script, [canvas, *self.pixel(x, y)]))
+
+    def shot(self, path: Path) -> None:
+        """Take a picture, for people to look at."""
+        self.page.screenshot(path=path)
