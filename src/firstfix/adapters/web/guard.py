@@ -58,7 +58,7 @@ class Access:
 
     def knows(self, token: str) -> bool:
         """Tell whether a token is right, in a time that does not tell how wrong it is."""
-        return self.token is None or hmac.compare_digest(token.encode(), self.token.encode())
+        return self.token is None or hmac.compare_digest(_as_bytes(token), _as_bytes(self.token))
 
 
 class Allowance:
@@ -81,16 +81,24 @@ class Allowance:
         self._rate_hz, self._burst, self._clock = rate_hz, burst, clock
         self._left: OrderedDict[str, tuple[float, float]] = OrderedDict()
 
-    def takes(self, client: str, cost: float = 1.0) -> bool:
-        """Take the cost of a request from what a client has left; False if it has too little."""
-        now = self._clock()
-        left, then = self._left.pop(client, (self._burst, now))
-        left = min(self._burst, left + (now - then) * self._rate_hz)
-        enough = left >= cost
-        self._left[client] = (left - cost if enough else left, now)
+    def takes(self, client: str) -> bool:
+        """Take one request from what a client has left; False if it has nothing left."""
+        if self._left_of(client) < 1.0:
+            return False
+        self.charge(client, 1.0)
+        return True
+
+    def charge(self, client: str, cost: float) -> None:
+        """Take so many requests from what a client has left, also if it has less."""
+        self._left[client] = (self._left_of(client) - cost, self._clock())
+        self._left.move_to_end(client)
         if len(self._left) > _MOST_CLIENTS:
             self._left.popitem(last=False)
-        return enough
+
+    def _left_of(self, client: str) -> float:
+        now = self._clock()
+        left, then = self._left.get(client, (self._burst, now))
+        return min(self._burst, left + (now - then) * self._rate_hz)
 
 
 class Guard:
@@ -131,7 +139,7 @@ class Guard:
             return problem(421, "this server answers to localhost and 127.0.0.1 only")
         origin = headers.get("origin")
         is_reading = scope["type"] == "http" and scope["method"] in _READING
-        if origin is not None and not is_reading and urlsplit(origin).netloc != host:
+        if origin is not None and not is_reading and _host_of(origin) != host:
             return problem(403, "pages of other sites may not ask for this")
         if scope["path"] == "/" or scope["path"].startswith("/static/"):
             return None
@@ -140,7 +148,7 @@ class Guard:
             return problem(429, "too many requests", {"retry-after": "1"})
         # A browser cannot give headers to a WebSocket: there the first message has the token.
         if scope["type"] == "http" and not self._knows_token(headers):
-            self._allowance.takes(client, _WRONG_TOKEN)
+            self._allowance.charge(client, _WRONG_TOKEN)
             return problem(401, "a token is needed", {"www-authenticate": "Bearer"})
         return None
 
@@ -159,6 +167,18 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def _as_bytes(token: str) -> bytes:
+    return token.encode(errors="surrogatepass")
+
+
+def _host_of(origin: str) -> str | None:
+    """Return host and port of an origin; None if it is none."""
+    try:
+        return urlsplit(origin).netloc or None
+    except ValueError:
+        return None
 
 
 def _is_loopback(header: str) -> bool:

@@ -146,6 +146,8 @@ def make_server(page: Page) -> uvicorn.Server:
         log_level="warning",
         http="h11",
         limit_concurrency=_MOST_CONNECTIONS,
+        # Anybody can write them: a proxy that is to be believed would have to be named.
+        proxy_headers=False,
         server_header=False,
         timeout_graceful_shutdown=_LAST_WORDS_S,
         ws="websockets-sansio",
