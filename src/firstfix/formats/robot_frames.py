@@ -71,9 +71,10 @@ class RobotFrames:
             forgotten.
         """
         back = 0.0
+        links = self._tf.links(self._odom, self._base)
+        clocks = () if isinstance(links, NotKnown) else links
         for new in transforms:
-            links = self._tf.links(self._odom, self._base)
-            if not isinstance(links, NotKnown) and new.child in links:
+            if new.child in clocks:
                 back = max(back, self._set_back(new.stamp))
             self._tf.add(new)
         return back
