@@ -113,7 +113,7 @@ def test_distances_are_those_of_the_map(grid):
 
 @pytest.mark.parametrize("resolution", [0.001, 0.01, 0.05, 0.25, 2.0])
 def test_any_size_of_cell_can_be_prepared(resolution):
-    cells = np.zeros((300, 400), np.int8)
+    cells = np.zeros((300, 60), np.int8)
     cells[0] = OCCUPIED
     fields = build_fields(OccupancyGrid(cells, resolution), None)
     assert fields.squares.max() <= fields.near**2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -51,8 +52,13 @@ def room(draw_room: Callable[[float], OccupancyGrid]) -> MapFields:
 
 
 @pytest.fixture(scope="session")
-def office_locator() -> Locator:
-    return Locator(office())
+def maps_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("maps")
+
+
+@pytest.fixture(scope="session")
+def office_locator(maps_cache: Path) -> Locator:
+    return Locator(office(), cache_dir=maps_cache)
 
 
 @pytest.fixture(scope="session")

@@ -16,9 +16,9 @@ from firstfix.fields.map_fields import MapFields, build_fields
 from firstfix.global_localization.answer import to_cells
 from firstfix.global_localization.beams import usable_beams
 from firstfix.global_localization.examine import examine, locate_near, sort_beams
+from firstfix.global_localization.locate import Locator
 from firstfix.global_localization.verify import verify
 from firstfix.sim.lidar import Lidar
-from firstfix.sim.office import office
 from firstfix.sim.world import random_free_poses
 
 LIDAR = Lidar(beams=180)
@@ -31,8 +31,8 @@ def hall(hall_plan: OccupancyGrid) -> MapFields:
 
 
 @pytest.fixture(scope="session")
-def office_fields() -> MapFields:
-    return build_fields(office(), None)
+def office_fields(office_locator: Locator) -> MapFields:
+    return office_locator.fields
 
 
 def drawn(fields: MapFields, n: int, seed: int = 0) -> list[SE2]:

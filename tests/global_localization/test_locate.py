@@ -10,7 +10,7 @@ import pytest
 
 from firstfix.core.angles import FULL_TURN, angle_error
 from firstfix.core.errors import MapError
-from firstfix.core.estimate import Verdict
+from firstfix.core.estimate import LocateResult, Verdict
 from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
@@ -185,9 +185,9 @@ def test_a_map_of_one_kind_is_no_map(value, method):
 # --- time ---
 
 
-def test_without_time_it_never_publishes(office_locator):
+def test_without_time_it_never_publishes(office_locator, maps_cache):
     grid = office_locator.fields.grid
-    hurried = Locator(grid, config=LocateConfig(budget_s=0.0))
+    hurried = Locator(grid, config=LocateConfig(budget_s=0.0), cache_dir=maps_cache)
     for seed in range(5):
         rng = np.random.default_rng(seed)
         scan = LIDAR.scan(grid, random_free_pose(grid, rng), rng)
@@ -213,15 +213,19 @@ def test_the_methods_of_the_paper(method, room, found):
         assert found(result, truth, 0.5, 16.0)
 
 
-def test_settings_reach_the_search(office_locator, found):
+def test_settings_reach_the_search(office_locator, maps_cache, found):
     rng = np.random.default_rng(13)
     grid = office_locator.fields.grid
     truth = random_free_pose(grid, rng)
     scan = LIDAR.scan(grid, truth, rng)
-    few = Locator(grid, config=LocateConfig(hypotheses=2, shortlist=20)).locate(scan)
+
+    def locate(config: LocateConfig) -> LocateResult:
+        return Locator(grid, config=config, cache_dir=maps_cache).locate(scan)
+
+    few = locate(LocateConfig(hypotheses=2, shortlist=20))
     assert len(few.hypotheses) <= 2
     assert found(few, truth, 0.05, 0.5)
-    never = Locator(grid, config=LocateConfig(unique_probability=1.0)).locate(scan)
+    never = locate(LocateConfig(unique_probability=1.0))
     assert never.verdict is not Verdict.UNIQUE
 
 

@@ -183,14 +183,19 @@ def test_beams_longer_than_the_reach(hit, room):
     assert_same(candidates, slow_search(beams, room, 20))
 
 
-def test_many_tiles():
+@pytest.fixture(scope="module")
+def tiles() -> MapFields:
     """More than one look at the clock, and rows of several tiles."""
-    fields = build_fields(random_map(5, 90, 300, 0.25), None)
+    fields = build_fields(random_map(5, 90, 200, 0.25), None)
     assert len(fields.positions.tile_rows) > 16
+    return fields
+
+
+def test_many_tiles(tiles):
     beams = random_beams(5, 9, 0.7, 10.0)
-    candidates, report = search(beams, fields, 300, math.inf)
+    candidates, report = search(beams, tiles, 300, math.inf)
     assert report.proven
-    assert_same(candidates, slow_search(beams, fields, 300))
+    assert_same(candidates, slow_search(beams, tiles, 300))
 
 
 @pytest.mark.parametrize("turns", [-1, 1])
@@ -228,14 +233,13 @@ def test_the_true_place_is_among_the_first(seed, room):
     assert ((distance < 0.3) & (turn < np.radians(5.0))).any()
 
 
-def test_without_time_it_says_what_it_left_and_gives_what_it_saw():
-    fields = build_fields(random_map(5, 90, 300, 0.25), None)
+def test_without_time_it_says_what_it_left_and_gives_what_it_saw(tiles):
     beams = random_beams(5, 30, 0.7, 10.0)
-    every, _ = search(beams, fields, ALL, math.inf)
-    some, report = search(beams, fields, ALL, 0.0)
+    every, _ = search(beams, tiles, ALL, math.inf)
+    some, report = search(beams, tiles, ALL, 0.0)
     assert not report.proven
     assert 0.0 < report.searched < 1.0
-    assert report.poses == len(fields.positions) * DIRECTIONS
+    assert report.poses == len(tiles.positions) * DIRECTIONS
     best_of = dict(zip(map(tuple, every.poses.tolist()), every.scores.tolist(), strict=True))
     assert 0 < len(some.poses) < len(every.poses)
     # A place on the edge of what was seen may be kept by its second position.
