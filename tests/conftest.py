@@ -17,6 +17,9 @@ from firstfix.core.trajectory import Trajectory
 from firstfix.sim.drawing import Drawing
 from firstfix.sim.lidar import Lidar
 
+# Of 100 that hypothesis likes to draw: a third of the time, and what they miss, others find later.
+CHECK_EXAMPLES = 30
+
 # Of packages that neither of the stores has.
 DEFINITIONS = {
     "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms",
@@ -64,6 +67,21 @@ def wire(request: pytest.FixtureRequest) -> Wire:
 def ros2() -> Wire:
     """Give the messages of ROS 2."""
     return Wire(Stores.ROS2_HUMBLE)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Choose how many examples of a law hypothesis draws; none has a deadline: others may work too.
+
+    `make check` leaves out what is slow, and draws fewer than `make test`; other ones each time.
+    """
+    if not config.pluginmanager.hasplugin("hypothesispytest"):
+        return  # a Python of ROS, for the tests of the nodes alone
+    from hypothesis import settings
+
+    settings.register_profile("all", deadline=None)
+    settings.register_profile("check", deadline=None, max_examples=CHECK_EXAMPLES)
+    if config.getoption("--hypothesis-profile") is None:
+        settings.load_profile("check" if config.option.markexpr == "not slow" else "all")
 
 
 @pytest.fixture(scope="session")
