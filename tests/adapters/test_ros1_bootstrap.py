@@ -18,9 +18,7 @@ def test_a_robot_at_rest_is_found_once(ros1: Lab) -> None:
     ros1.node()
     ros1.robot("stand")
     found = watcher.wait_for("initialpose")
-    metres, degrees = ros1.error_of(found)
-    assert (metres, degrees) < (0.2, 3.0)
-    assert degrees < 3.0
+    assert ros1.error_of(found).is_small
     assert found["frame"] == "map"
     told = watcher.wait_for("localization_status", state="LOCALIZED")
     assert (told["level"], told["mode"]) == (0, "bootstrap")
@@ -39,7 +37,7 @@ def test_an_amcl_that_comes_late_gets_the_pose_of_now(ros1: Lab) -> None:
         late = ros1.watch("initialpose", "localization_status")
         now = late.wait_for("initialpose")
         assert now["stamp"] > found["stamp"]
-        assert ros1.error_of(now) < (0.2, 3.0)
+        assert ros1.error_of(now).is_small
         assert late.wait_for("localization_status")["state"] == "LOCALIZED"
         late.end()
 
@@ -67,7 +65,7 @@ def test_places_that_look_alike_are_told_instead_of_a_pose(ros1: Lab) -> None:
     handed_over = wait_until(
         lambda: watcher.lines("initialpose")[1:], lambda: "only what the person said"
     )[0]
-    assert ros1.error_of(handed_over) < (0.2, 3.0)
+    assert ros1.error_of(handed_over).is_small
     # The places that were left are gone.
     wait_until(lambda: not watcher.lines("hypotheses")[-1]["places"], lambda: "places stay")
 
@@ -99,4 +97,4 @@ def test_services_search_anew(ros1: Lab) -> None:
         since = time.time()
         robot.tell(ask=name)
         assert watcher.wait_for("localization_status", since, state="SEARCHING")["level"] == 1
-        assert ros1.error_of(watcher.wait_for("initialpose", since)) < (0.2, 3.0)
+        assert ros1.error_of(watcher.wait_for("initialpose", since)).is_small

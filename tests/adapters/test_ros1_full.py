@@ -78,7 +78,7 @@ def test_a_robot_that_is_carried_away_is_found_where_it_is_set_down(ros1: Lab) -
     # Not a word meanwhile.
     assert min(again["at"], followed["at"]) > standing["at"]
     for found in (again, followed):
-        assert ros1.error_of(found) < (0.2, 3.0)
+        assert ros1.error_of(found).is_small
         assert abs(found["pose"][0] - before["pose"][0]) > 1.0
     assert watcher.lines("localization_status")[-1]["state"] == "LOCALIZED"
     assert "Traceback" not in follower.said + helper.said
@@ -125,4 +125,4 @@ def test_the_map_comes_from_where_it_is_said_to_be(ros1: Lab, source: str, tmp_p
         save_map(WORLDS["office"](), tmp_path / "office.yaml")
         ros1.node(f"_yaml_filename:={tmp_path / 'office.yaml'}")
         ros1.robot("stand", "--flaws", "no map")
-    assert ros1.error_of(watcher.wait_for("initialpose")) < (0.2, 3.0)
+    assert ros1.error_of(watcher.wait_for("initialpose")).is_small

@@ -18,7 +18,7 @@ import time
 import xmlrpc.client
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from firstfix.core.angles import angle_error
 from firstfix.core.se2 import SE2
@@ -26,6 +26,7 @@ from firstfix.core.se2 import SE2
 HERE = Path(__file__).parent
 # Debian's tools run on Debian's Python.
 PATH = os.pathsep.join(["/usr/bin", os.environ.get("PATH", "")])
+TOOLS = ("roscore", "roslaunch", "rosbag")
 # In a fresh checkout, kernels are compiled first, by several processes at a time.
 PATIENCE_S = 240.0
 _POLL_S = 0.05
@@ -41,9 +42,8 @@ def why_missing() -> str | None:
     """Say what a ROS 1 needs and this machine lacks."""
     if importlib.util.find_spec("rospy") is None:
         return f"no rospy in {sys.executable}"
-    if shutil.which("roscore", path=PATH) is None:
-        return "no roscore in PATH"
-    return None
+    lacking = [tool for tool in TOOLS if shutil.which(tool, path=PATH) is None]
+    return f"no {', '.join(lacking)} in PATH" if lacking else None
 
 
 def wait_until(
@@ -159,6 +159,18 @@ class Master:
         """Set a parameter."""
         self._ask("setParam", parameter, value)
 
+    def get(self, parameter: str) -> Any:
+        """Return a parameter."""
+        return self._ask("getParam", parameter)
+
+    def pid_of(self, node: str) -> int:
+        """Return the process id of a node, as it says itself; 0 if nobody answers."""
+        uri = self._ask("lookupNode", node)
+        with contextlib.suppress(OSError), xmlrpc.client.ServerProxy(uri) as asked:
+            answer: Any = asked.getPid("/lab")
+            return int(answer[2])
+        return 0
+
     def publishers(self, topic: str) -> list[str]:
         """Return the nodes that publish a topic."""
         published = self._ask("getSystemState")[0]
@@ -223,6 +235,25 @@ class Watcher:
         return found[0]
 
 
+class Error(NamedTuple):
+    """How far two poses are apart."""
+
+    metres: float
+    degrees: float
+
+    @property
+    def is_small(self) -> bool:
+        """As near as a robot must be found."""
+        return self.metres < 0.2 and self.degrees < 3.0
+
+
+def apart(line: Line, T_map_base: SE2) -> Error:
+    """Compare a pose that was heard with another one."""
+    x, y, yaw = line["pose"]
+    metres = math.hypot(x - T_map_base.x, y - T_map_base.y)
+    return Error(metres, math.degrees(angle_error(yaw, T_map_base.yaw)))
+
+
 class Lab:
     """One test: a master and programs, all ended with it."""
 
@@ -261,12 +292,9 @@ class Lab:
         poses = wait_until(lambda: self._truth_from(stamp), lambda: "no truth so late")
         return SE2(*poses[0][1:])
 
-    def error_of(self, line: Line) -> tuple[float, float]:
-        """Return how far from the truth a pose is that was heard, m and degrees."""
-        x, y, yaw = line["pose"]
-        truth = self.truth_at(line["stamp"])
-        apart = math.hypot(x - truth.x, y - truth.y)
-        return apart, math.degrees(angle_error(yaw, truth.yaw))
+    def error_of(self, line: Line) -> Error:
+        """Return how far from the truth a pose is that was heard."""
+        return apart(line, self.truth_at(line["stamp"]))
 
     def end(self) -> None:
         """End everything."""
