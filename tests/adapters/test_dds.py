@@ -61,7 +61,7 @@ def test_a_robot_at_rest_is_found_and_its_pose_handed_over_once(dds):
     assert off_by(dds.truth(), pose_of(late.heard[0])) < (0.1, 0.05)
 
     assert node.end(signal.SIGINT) == 0
-    assert "WARNING" not in node.log
+    assert "WARN" not in node.log
     assert "LOCALIZED" in node.log
 
 
@@ -185,6 +185,37 @@ def test_robots_in_namespaces_do_not_hear_each_other(dds):
     wait_for(lambda: len(graphs.heard) == 2)
     places = {m.node_entities_info_seq[0].node_namespace for m in graphs.heard}
     assert places == {"/robot1", "/robot2"}
+
+
+@pytest.mark.slow
+def test_who_finds_whom_is_as_the_variables_of_ros_say(dds):
+    here = "<General><Interfaces><NetworkInterface name='lo'/></Interfaces></General>"
+    near = {"ROS_LOCALHOST_ONLY": "1", "CYCLONEDDS_URI": here}
+    alone = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF", "CYCLONEDDS_URI": here}
+    graphs = dds.ear_named(GRAPH.name, GRAPH.type_name)
+    hidden = dds.node("--name", "hidden", **alone)
+    dds.node("--name", "near", **near)
+    wait_for(lambda: graphs.heard and "nothing heard" in hidden.log)
+    assert {m.node_entities_info_seq[0].node_name for m in graphs.heard} == {"near"}
+
+
+@pytest.mark.slow
+@pytest.mark.shared
+def test_a_bag_of_a_real_robot_is_followed(dds, shared):
+    case = shared / "cases" / "olin_mac1_9_23"
+    poses = dds.ear("/amcl_pose", POSE)
+    status = dds.ear("/localization_status", STATUS)
+    told = ("--map", str(case / "map.yaml"), "--mode", "full", "--base-frame", "base_link")
+    node = dds.node(*told)
+    wait_for(lambda: "SEARCHING" in states(status))
+    player = dds.player(shared / "bags" / "olin_ros2", 4.0, "scan", "tf", "tf_static")
+    assert player.process.wait(300.0) == 0, player.log
+    scans = np.load(case / "scans.npz")
+    truth = dict(zip(np.round(scans["stamp"], 3), scans["true_pose"], strict=True))
+    pairs = [(truth.get(round(to_seconds(m.header.stamp), 3)), pose_of(m)) for m in poses.heard]
+    errors = [np.hypot(t[0] - p[0], t[1] - p[1]) for t, p in pairs if t is not None]
+    assert len(errors) > 20, node.log
+    assert np.percentile(errors, 95) < 0.3  # of the laser, which sits 4 mm from the base
 
 
 def test_without_cyclone_dds_the_command_says_what_to_install(monkeypatch, capsys):

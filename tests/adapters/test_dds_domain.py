@@ -89,3 +89,7 @@ def test_what_cyclone_dds_cannot_be_told_is_refused():
 @given(st.text(st.characters(min_codepoint=32, max_codepoint=126)))
 def test_peers_cannot_break_the_configuration(text):
     assert len(peers(ROS_STATIC_PEERS=text)) == sum(bool(p.strip()) for p in text.split(";"))
+
+
+def test_dds_is_here_where_it_must_be(dds):
+    assert dds.domain > 0  # other modules of tests are passed over where it is missing

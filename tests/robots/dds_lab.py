@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 ROBOT = Path(__file__).with_name("dds_robot.py")
+PLAYER = Path(__file__).with_name("dds_player.py")
 # Nothing leaves this machine.
 LOOPBACK = (
     "<General><Interfaces><NetworkInterface name='lo'/></Interfaces>"
@@ -100,6 +101,10 @@ class Lab:
         """Start a robot."""
         program = [sys.executable, str(ROBOT), script, str(self.folder / truth), *arguments]
         return self._start(program, {})
+
+    def player(self, bag: Path, speed: float, *topics: str) -> Program:
+        """Start to play a bag."""
+        return self._start([sys.executable, str(PLAYER), str(bag), f"{speed}", *topics], {})
 
     def ear(self, topic: str, kind: str, *policies: Any) -> Ear:
         """Listen to a topic of ROS."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import sys
 import threading
@@ -22,6 +23,8 @@ from firstfix.adapters.topics import PARTICLES, Heard, Topic, heard_topics, said
 from firstfix.adapters.transport import Gravity
 from firstfix.core.errors import InputError
 from firstfix.system.node_config import NodeConfig
+
+_LEVELS = {Gravity.INFO: "INFO", Gravity.WARNING: "WARN", Gravity.ERROR: "ERROR"}
 
 
 class Dds:
@@ -83,7 +86,7 @@ class Dds:
         self._graph.send(entities(self._participant, *place, readers, writers))
 
     def close(self) -> None:
-        """Leave; nothing is heard or said afterwards."""
+        """Hear nothing more."""
         for watch in self._watches:
             watch.close()
 
@@ -101,9 +104,10 @@ class Dds:
 
     def log(self, gravity: Gravity, text: str) -> None:
         """Write a line to the console, in the form of ROS 2."""
-        name, now = gravity.value.upper(), time.time()
-        sys.stderr.write(f"[{name}] [{now:.3f}] [{self._names.node}]: {text}\n")
-        sys.stderr.flush()
+        with contextlib.suppress(OSError):  # whoever read it may have gone
+            line = f"[{_LEVELS[gravity]}] [{time.time():.3f}] [{self._names.node}]: {text}\n"
+            sys.stderr.write(line)
+            sys.stderr.flush()
 
     def _dds_name(self, topic: Topic) -> str:
         return f"rt{self._names.resolve(topic.name)}"
