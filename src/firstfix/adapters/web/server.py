@@ -107,6 +107,9 @@ def listen(host: str, port: int) -> socket.socket:
             received=_why(error),
             remedy="choose another --port or --host, or end what listens there",
         ) from error
+    # Connections inherit these. asyncio sets the first only where it recognises the socket as TCP,
+    # which this one does not say; without it every answer waits 40 ms for an acknowledgement.
+    listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
     if hasattr(socket, "TCP_USER_TIMEOUT"):
         listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _SILENT_MS)
