@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from firstfix.cli.live import PORT, Address, Rest, serve_simulated
 from firstfix.cli.progress import working
+from firstfix.cli.worlds import world_or_map
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,28 +29,52 @@ def demo(
         ),
     ] = "office",
     seed: Annotated[int, typer.Option(min=0, help="Another seed, another story.")] = 1,
-    headless: Annotated[  # noqa: ARG001 - there is nothing but the story yet
-        bool, typer.Option("--headless", help="Tell the story here, and end.")
+    headless: Annotated[
+        bool, typer.Option("--headless", help="Tell a story here instead, and end.")
     ] = False,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: any.")] = PORT,
     plot: Annotated[
-        Path, typer.Option(metavar="FILE", help="Where the picture goes: .png, .svg or .pdf.")
-    ] = Path("firstfix-demo.png"),
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="With --headless, where the picture goes: .png, .svg or .pdf.",
+        ),
+    ] = None,
 ) -> None:
     """Let a simulated Kobuki wake up in a building that it has a map of, and see what happens.
 
-    It is located without motion and followed while it drives; somebody picks it up and carries it
-    away; then it is somewhere else all of a sudden, and nothing but its LIDAR can notice. Exit
-    status 0 if all went well, 1 if it was not found, found in the wrong place, or lost. In rooms,
-    and mostly in the corridor, that is so: these look the same everywhere.
-    """
-    from firstfix.evaluation.figure import can_draw, check_path
+    A page shows it being found without motion, and followed while it drives about. There you can
+    send it somewhere, pick it up and put it down elsewhere, or let people get in its way.
 
-    check_path(plot)
-    grid = _world(world)
+    With `--headless` a story is told here: it is found, driven, carried away by somebody, then
+    somewhere else all of a sudden, and nothing but its LIDAR can notice. Exit status 0 if all went
+    well, 1 if it was not found, found in the wrong place, or lost. In rooms, and mostly in the
+    corridor, that is so: these look the same everywhere.
+    """
+    from firstfix.evaluation.figure import check_path
+
+    picture = plot or Path("firstfix-demo.png")
+    check_path(picture)
+    if plot is not None and not headless:
+        raise InputError(
+            expected="--plot with --headless",
+            received=f"--plot {plot} alone",
+            remedy="the page is all the picture that there is otherwise",
+        )
+    grid = world_or_map(world)
     typer.echo(
         f"Building   {world}: {grid.width} x {grid.height} cells of {grid.resolution:g} m, "
         f"{grid.free_area:.0f} m² free"
     )
+    if headless:
+        _tell_story(grid, seed, picture)
+    else:
+        serve_simulated(grid, Path(world).stem, seed, Address("127.0.0.1", port), Rest.SLEEPS)
+
+
+def _tell_story(grid: OccupancyGrid, seed: int, plot: Path) -> None:
+    from firstfix.evaluation.figure import can_draw
+
     with working("preparing the map"):
         # The kernels too: what they take to compile is no part of the story.
         from firstfix.cli.story import play, warm_up
@@ -71,21 +97,6 @@ def demo(
         typer.echo("The end    not all went well.")
         raise typer.Exit(FAILED)
     typer.echo("The end    found, followed, carried away, found again. Nobody had to help.")
-
-
-def _world(name: str) -> OccupancyGrid:
-    from firstfix.formats.map_server import load_map
-    from firstfix.sim.world import WORLDS
-
-    if name in WORLDS:
-        return WORLDS[name]()
-    if not Path(name).exists():
-        raise InputError(
-            expected=f"a world ({', '.join(WORLDS)}) or a map's YAML",
-            received=f"{name}, which is neither",
-            remedy="choose another --world",
-        )
-    return load_map(Path(name))
 
 
 def _told(scenes: list[Scene], acts: list[Act]) -> list[str]:
