@@ -129,7 +129,8 @@ def described(type_name: str) -> type[IdlStruct]:
 def _struct(name: str) -> type[IdlStruct]:
     package, _, short = name.split("/")
     fields = {field: _field(kind) for field, kind in _store().fielddefs[name][1]}
-    return make_idl_struct(f"{short}_", f"{package}.msg.dds_.{short}_", fields)
+    made: type[IdlStruct] = make_idl_struct(f"{short}_", f"{package}.msg.dds_.{short}_", fields)
+    return made
 
 
 def _field(described_as: Any) -> Any:
