@@ -20,6 +20,9 @@ from firstfix.system.config import LocalizerConfig
 from firstfix.system.inputs import Input, NewMap
 from firstfix.system.localizer import Localizer
 
+# After that, whatever is being thought is left alone.
+_END_S = 5.0
+
 
 class SimNode:
     """Lets a robot live, and a localizer find and follow it.
@@ -63,9 +66,9 @@ class SimNode:
         self._thread.start()
 
     def stop(self) -> None:
-        """End after the present moment."""
+        """End after the present moment, unless that takes long, as compiling kernels does."""
         self._inbox.close()
-        self._thread.join()
+        self._thread.join(_END_S)
 
     def give(self, given: Input) -> None:
         """Take in what the robot does not know of, such as the word of a person.
@@ -79,13 +82,13 @@ class SimNode:
 
     def _live(self) -> None:
         warm_up(LocalizerConfig().amcl)
-        self._handle(NewMap(0.0, self._grid))
+        self._try(self._handle, NewMap(0.0, self._grid))
         due = time.monotonic()
         while not self._inbox.is_closed:
             for given in self._inbox.take(max(0.0, due - time.monotonic())):
-                self._handle(given)
+                self._try(self._handle, given)
             if time.monotonic() >= due:
-                self._go_on()
+                self._try(self._go_on)
                 # A machine that was asleep does not run after what it missed.
                 due = max(due + PERIOD_S, time.monotonic())
 
@@ -97,10 +100,13 @@ class SimNode:
                 self._handle(event)
 
     def _handle(self, given: Input) -> None:
+        outputs = self._localizer.handle(given)
+        for watch in self._watchers:
+            watch(given, outputs, self._localizer)
+
+    def _try(self, step: Callable[..., None], *given: Input) -> None:
         try:
-            outputs = self._localizer.handle(given)
-            for watch in self._watchers:
-                watch(given, outputs, self._localizer)
+            step(*given)
         except InputError as error:
             self._complain(f"{error}")
         except Exception:  # noqa: BLE001 - a robot that stopped silently would be worse

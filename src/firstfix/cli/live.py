@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import webbrowser
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
@@ -174,4 +173,6 @@ def _tell(listening: socket.socket, access: Access) -> None:
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )
     if has_display and sys.stdout.isatty():
+        import webbrowser
+
         webbrowser.open(url)
