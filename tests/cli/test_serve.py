@@ -129,6 +129,14 @@ def test_what_cannot_be_served(cli, arguments: tuple[str, ...], words: tuple[str
     assert_one_line(cli("serve", *arguments), *words)
 
 
+def test_arguments_of_ros_that_are_none(cli, unique: Files) -> None:
+    pytest.importorskip("cyclonedds")
+    for arguments in (("-x", "y"), ("-p",), ("-p", "mode"), ("--params-file", "no.yaml")):
+        ended = cli("serve", unique[0], "--robot", "dds", "--port", 0, "--", *arguments)
+        assert ended.status == 2
+        assert ended.err.startswith("firstfix: expected ")
+
+
 def test_options_that_are_none(cli) -> None:
     for arguments in (("--robot", "fish"), ("--port", "70000"), ("--prot", "1")):
         assert cli("serve", "house", *arguments).status == 2

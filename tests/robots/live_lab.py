@@ -26,15 +26,15 @@ from firstfix.system.localizer import Localizer
 WAIT_S = 60.0
 
 
-def until(holds: Callable[[], Any], what: str = "it") -> Any:
+def until(holds: Callable[[], Any], what: str = "it", patience_s: float = WAIT_S) -> Any:
     """Wait until something holds; no test depends on how long that takes."""
-    end = time.monotonic() + WAIT_S
+    end = time.monotonic() + patience_s
     while time.monotonic() < end:
         value = holds()
         if value:
             return value
         time.sleep(0.01)
-    pytest.fail(f"waited {WAIT_S:g} s for {what}")
+    pytest.fail(f"waited {patience_s:g} s for {what}")
 
 
 @dataclass

@@ -41,7 +41,9 @@ class PageBeside:
             Page(robot, self._feed, Steering(self._feed, self._give), access)
         )
         serve = {"sockets": [listening]}
-        self._thread = threading.Thread(target=self._server.run, kwargs=serve, name="page")
+        self._thread = threading.Thread(
+            target=self._server.run, kwargs=serve, name="page", daemon=True
+        )
 
     def __enter__(self) -> PageBeside:
         self._thread.start()
