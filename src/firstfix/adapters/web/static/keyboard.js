@@ -23,7 +23,7 @@ export function listenToKeys(page) {
 function belongsToControl({ key, target }) {
   if (target.matches("input[type=text], input[type=password]")) return true;
   if (target.matches("input[type=range]")) return key in ARROWS;
-  if (target.matches("#details")) return key === "ArrowUp" || key === "ArrowDown";
+  if (target.matches("#details, #events")) return key === "ArrowUp" || key === "ArrowDown";
   return target.matches("button, a") && (key === " " || key === "Enter");
 }
 

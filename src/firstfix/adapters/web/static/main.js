@@ -13,7 +13,9 @@ import { Sheet } from "./sheet.js";
 import { Stage } from "./stage.js";
 import { Theme } from "./theme.js";
 import { Timeline } from "./timeline.js";
-import { authorization, keepToken, takeTokenFromFragment } from "./token.js";
+import {
+  authorization, forgetToken, keepToken, takeTokenFromFragment, token,
+} from "./token.js";
 import { View } from "./view.js";
 import { metres } from "./words.js";
 
@@ -102,6 +104,9 @@ async function pictureOf(map) {
 
 function askForToken() {
   app.dataset.connected = "false";
+  byId("token-text").textContent =
+    token() ? "That was not the right one." : "Whoever started firstfix has it. This tab keeps it.";
+  forgetToken();
   const dialog = byId("token-dialog");
   if (!dialog.open) dialog.showModal();
 }

@@ -32,9 +32,13 @@ export class Sheet {
   /** How much of the window the panel and the bars cover, px. */
   covered() {
     const box = this.#panel.getBoundingClientRect();
-    if (!this.isNarrow) return { left: 0, top: 0, right: innerWidth - box.left, bottom: 0 };
-    const head = document.getElementById("state").getBoundingClientRect().bottom - box.top + 10;
     const tools = document.getElementById("tools");
+    const view = document.getElementById("view-tools").getBoundingClientRect();
+    if (!this.isNarrow) {
+      const bottom = tools.hidden ? 0 : tools.offsetHeight;
+      return { left: view.right, top: 0, right: innerWidth - box.left, bottom };
+    }
+    const head = document.getElementById("state").getBoundingClientRect().bottom - box.top + 10;
     document.getElementById("app").style.setProperty("--sheet-head", `${head}px`);
     return { left: 0, top: 0, right: 0, bottom: head + (tools.hidden ? 0 : tools.offsetHeight + 8) };
   }
