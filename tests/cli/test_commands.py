@@ -168,6 +168,7 @@ def test_the_demo_tells_a_story_that_ends_well(cli, tmp_path: Path) -> None:
     assert (tmp_path / "firstfix-demo.png").stat().st_size > 5000
 
 
+@pytest.mark.usefixtures("short_story")
 def test_the_demo_says_so_where_nobody_can_know(cli) -> None:
     ended = cli("demo", "--world", "rooms", "--headless", "--seed", 3)
     assert (ended.status, ended.err) == (1, "")

@@ -17,7 +17,7 @@ from firstfix.fields.cache import cache_folder, content_key, load_or_build
 plain = scalar_dtypes().filter(lambda dtype: dtype.kind in "biufc")
 any_array = plain.flatmap(lambda dtype: arrays(dtype, array_shapes(min_dims=0, min_side=0)))
 into_one_folder = settings(
-    deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100
+    deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 

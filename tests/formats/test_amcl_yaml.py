@@ -132,7 +132,7 @@ def test_every_setting_can_be_written_and_read(load):
         },
     )
 )
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_what_is_written_is_read(load, said):
     text = "".join(f"    {k}: {written(v)!r}\n" for k, v in said.items())
     assert load(f"amcl:\n  ros__parameters:\n    use_sim_time: true\n{text}") == AmclConfig(**said)

@@ -307,9 +307,7 @@ def test_a_scan_that_is_none_is_told_with_its_place(write: Write) -> None:
         load_carmen(log, kind="ROBOTLASER1")
 
 
-@settings(
-    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data(), name=st.sampled_from(["a.log", "a.log.gz"]))
 def test_damage_is_always_a_scan_error(write: Write, data: st.DataObject, name: str) -> None:
     path = write("PARAM robot_frontlaser_offset 0.1 h 0", robot_laser(), *driven(3), name=name)

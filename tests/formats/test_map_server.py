@@ -129,7 +129,7 @@ def judge(value: int, maxval: int, keys: dict) -> int:
     return math.floor((p - free) / (occupied - free) * 100 + Fraction(1, 2))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(deadline=None)
 @given(
     data=st.data(),
     maxval=st.sampled_from([1, 2, 100, 254, 255, 256, 1000, 65535]),

@@ -164,7 +164,7 @@ def test_what_is_no_saved_pose(tmp_path, data):
     assert "\n" not in str(caught.value)
 
 
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_a_file_cut_or_changed_anywhere_is_read_or_refused(tmp_path, data):
     save_pose(tmp_path / "pose.json", pose())

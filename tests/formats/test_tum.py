@@ -42,7 +42,7 @@ def test_the_lines_are_the_formats(tmp_path):
     assert_array_equal(table[:, 0], PATH.stamps)
 
 
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(FINITE, min_size=1, max_size=5).map(sorted),
     st.lists(st.tuples(FINITE, FINITE, st.floats(-10.0, 10.0)), min_size=5, max_size=5),
