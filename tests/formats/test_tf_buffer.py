@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation, Slerp
 
-from firstfix.formats.messages import StampedTransform
-from firstfix.formats.tf_buffer import FARTHEST_M, KEPT_S, NotKnown, TransformBuffer
+from firstfix.formats.messages import FARTHEST_M, StampedTransform
+from firstfix.formats.tf_buffer import KEPT_S, NotKnown, TransformBuffer
 from firstfix.formats.transforms import matrix
 
 LENGTHS = st.floats(-10.0, 10.0)

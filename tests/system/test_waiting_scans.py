@@ -74,6 +74,15 @@ def test_a_scan_ahead_of_odometry_waits_while_older_ones_are_used(robot_in, hall
     assert pose.stamp == early + 5.0
 
 
+def test_a_scan_with_a_stamp_from_the_future_holds_up_no_other(robot_in, hall_plan):
+    robot = robot_in(hall_plan, SE2(1.5, 1.5, 0.0))
+    robot.tick()
+    now, robot.stamp = robot.stamp, 1e6
+    assert robot.tell(robot.scan()) == []
+    robot.stamp = now
+    assert [pose.stamp for pose in poses_of(robot.tick())] == [robot.stamp]
+
+
 # ---- scans from somebody's hands
 
 

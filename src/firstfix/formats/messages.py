@@ -20,6 +20,9 @@ from firstfix.core.se2 import SE2
 # A unit quaternion that lost more than this is not a rotation any more.
 MIN_NORM = 1e-3
 
+FARTHEST_M = 1e9
+"""Nothing on a robot or in its map is farther from its parent; sums of such numbers stay finite."""
+
 _MAP_REMEDY = "look for the node that publishes the map"
 
 
@@ -144,7 +147,7 @@ def to_grid(message: Any) -> OccupancyGrid:
     x, y, yaw = _shadow(
         (info.origin.position.x, info.origin.position.y), _map_rotation(info.origin.orientation)
     )
-    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):
+    if not _is_place(x, y, yaw):
         raise MapError(
             expected="an origin of the map with a position and a rotation",
             received=f"position ({x}, {y}) and a yaw of {yaw}",
@@ -254,10 +257,10 @@ def to_planar(transform: StampedTransform) -> SE2:
     Raises
     ------
     ScanError
-        If a number of the transform is not finite.
+        If a number of the transform is not finite, or beyond `FARTHEST_M`.
     """
     x, y, yaw = planar(transform)
-    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):
+    if not _is_place(x, y, yaw):
         raise ScanError(
             expected=f"a transform of finite numbers from {transform.parent} to {transform.child}",
             received=f"{transform.translation} and {transform.rotation}",
@@ -294,6 +297,10 @@ def _map_rotation(rotation: Any) -> tuple[float, float, float, float]:
     if rotation.x == rotation.y == rotation.z == rotation.w == 0.0:
         return 0.0, 0.0, 0.0, 1.0
     return _normalized(rotation)
+
+
+def _is_place(x: float, y: float, yaw: float) -> bool:
+    return abs(x) <= FARTHEST_M and abs(y) <= FARTHEST_M and math.isfinite(yaw)
 
 
 def _shadow(

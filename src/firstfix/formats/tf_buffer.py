@@ -10,13 +10,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.formats.messages import StampedTransform
+from firstfix.formats.messages import FARTHEST_M, StampedTransform
 from firstfix.formats.transforms import inverse, matrix
 
 KEPT_S = 10.0
 """How long moving transforms are remembered, s: as long as tf2 does."""
-FARTHEST_M = 1e9
-"""Nothing on a robot is farther from its parent; products of such numbers stay finite."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -177,13 +177,15 @@ class Localizer:
         return [Status(given.stamp, self.state, "the next scan will be used in any case")]
 
     def _take_waiting_scan(self) -> list[Output]:
-        last, scan = self._odometry.last, None
+        last = self._odometry.last
         if last is None or self.state is State.NO_MAP:
             return []
-        while self._waiting and self._waiting[0].stamp <= last.stamp:
-            scan = self._waiting.popleft()
-        if scan is None:
+        reached = [scan for scan in self._waiting if scan.stamp <= last.stamp]
+        if not reached:
             return []
+        for scan in reached:  # not only the first: one stamp from the future must not block all
+            self._waiting.remove(scan)
+        scan = reached[-1]
         T_odom_base = self._odometry.at(scan.stamp)
         if T_odom_base is None:
             reason = "a scan is older than the odometry that is known: left out"
