@@ -1,10 +1,13 @@
 """What lines of a plot look like, and the curve of a share."""
 
 import math
+from pathlib import Path
 
+import numpy as np
 from numpy.testing import assert_array_equal
+from PIL import Image
 
-from firstfix.evaluation.figure import PALETTE, line_style, share_curve
+from firstfix.evaluation.figure import PALETTE, line_style, new_figure, save_figure, share_curve
 
 
 def test_no_two_lines_of_a_plot_look_alike() -> None:
@@ -18,3 +21,16 @@ def test_a_share_counts_what_is_not_known_and_what_is_off_the_axis() -> None:
     assert_array_equal(x, [0.1, 0.1, 2.0, 10.0, 10.0])
     assert_array_equal(y, [0.0, 0.25, 0.5, 0.75, 0.75])
     assert_array_equal(share_curve([math.inf], 0.1, 10.0), [[0.1, 10.0], [0.0, 0.0]])
+
+
+def test_a_png_has_a_palette_and_keeps_its_colours(tmp_path: Path) -> None:
+    figure = new_figure(2.0, 2.0)
+    axes = figure.subplots()
+    for i, colour in enumerate(PALETTE):
+        axes.bar(i, 1.0, color=colour)
+    with Image.open(save_figure(figure, tmp_path / "bars.png")) as image:
+        assert image.mode == "P"
+        pixels = np.asarray(image.convert("RGB")).reshape(-1, 3).astype(int)
+    for colour in PALETTE:
+        wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+        assert np.abs(pixels - wanted).max(axis=1).min() <= 4

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,10 @@ from firstfix.core.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+    from PIL import Image
+
+_DOTS_PER_INCH = 120
+_COLOURS = 128  # a dozen, and their blends where edges are smoothed
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
@@ -126,7 +131,10 @@ def save_figure(figure: Figure, path: Path) -> Path:
     check_path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=120)
+        if path.suffix.lower() == ".png":
+            _with_few_colours(figure).save(path, optimize=True)
+        else:
+            figure.savefig(path)
     except OSError as error:
         raise InputError(
             expected="a place where a picture can be written",
@@ -134,3 +142,13 @@ def save_figure(figure: Figure, path: Path) -> Path:
             remedy="choose another file",
         ) from None
     return path.resolve()
+
+
+def _with_few_colours(figure: Figure) -> Image.Image:
+    """Draw a figure with a palette: a third of the bytes, and reports are kept in repositories."""
+    from PIL import Image
+
+    drawn = BytesIO()
+    figure.savefig(drawn, format="png", dpi=_DOTS_PER_INCH)
+    with Image.open(drawn) as image:
+        return image.convert("RGB").quantize(_COLOURS, dither=Image.Dither.NONE)

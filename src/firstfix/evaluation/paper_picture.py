@@ -100,8 +100,10 @@ def draw_starts(shown: Shown, path: Path) -> Path:
     for axes in grid_of_axes[: len(panels)]:
         handles, labels = axes.get_legend_handles_labels()
         known |= dict(zip(labels, handles, strict=True))
-    figure.legend(known.values(), known.keys(), loc="outside lower center", ncols=8, markerscale=2,
-                  fontsize="x-small")  # fmt: skip
+    figure.legend(
+        known.values(), known.keys(), loc="outside lower center", ncols=4 if shape > 1.2 else 8,
+        markerscale=2, fontsize="x-small",
+    )  # fmt: skip
     figure.suptitle(f"{shown.world}, drive {shown.seed}", fontsize="small")
     return save_figure(figure, path)
 
@@ -166,7 +168,7 @@ def _draw_scan(axes: Axes, grid: OccupancyGrid, scan: LaserScan, T_map_base: SE2
 def _draw_robot(axes: Axes, pose: SE2, colour: str, label: str) -> None:
     sides = (abs(high - low) for low, high in (axes.get_xlim(), axes.get_ylim()))
     shorter, longer = sorted(sides)
-    size = max(ROBOT_M, min(longer / 50, shorter / 6))
+    size = max(ROBOT_M, min(longer / 50, shorter / 10))
     ring = np.linspace(-math.pi, math.pi, 40)
     x, y = pose.x + size * np.cos(ring), pose.y + size * np.sin(ring)
     axes.fill(x, y, facecolor="none" if colour == "black" else colour, edgecolor=colour, lw=1.5,

@@ -56,9 +56,9 @@ def save_reliability(entries: Sequence[Row], path: Path) -> Path:
     curves.set_yticks(_RISKS, [f"{100 * risk:g} %" for risk in _RISKS])
     curves.set(xlim=(_LEAST_COVERAGE, 1.01), ylim=(-1e-4, 1.0))
     curves.set(xlabel="coverage: share of scans answered", ylabel="risk: share of answers wrong")
-    for axes in (diagram, curves):
+    for axes, corner in ((diagram, "lower right"), (curves, "upper left")):
         axes.grid(alpha=0.25)
-        axes.legend(fontsize="x-small", loc="upper left")
+        axes.legend(fontsize="x-small", loc=corner)
     return save_figure(figure, path)
 
 
@@ -82,5 +82,5 @@ def _draw_curve(axes: Axes, curve: Row, colour: str, dash: str, label: str) -> N
     marker = "o" if len(curve["risk"]) == 1 else None
     axes.plot(
         curve["coverage"], curve["risk"], ls=dash, marker=marker, color=colour, lw=1.4,
-        drawstyle="steps-post", label=label,
+        drawstyle="steps-pre", label=label,
     )  # fmt: skip
