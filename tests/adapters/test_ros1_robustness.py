@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
+from pathlib import Path
 
 import pytest
 from ros1_lab import Lab, wait_until
@@ -68,12 +69,17 @@ def test_a_node_that_was_killed_finds_the_robot_again_and_signals_end_it_well(ro
         assert "Traceback" not in node.said
 
 
-def test_a_node_ends_well_before_it_is_ready(ros1: Lab) -> None:
+def test_a_node_ends_well_while_its_kernels_are_compiled(ros1: Lab, tmp_path: Path) -> None:
+    ros1.master.environment["NUMBA_CACHE_DIR"] = str(tmp_path / "nothing compiled yet")
     node = ros1.node("_mode:=full")
     wait_until(lambda: ros1.master.publishers("/amcl_pose"), lambda: node.said)
+    time.sleep(2.0)
     node.send(signal.SIGINT)
     assert node.wait() == 0
     assert "Traceback" not in node.said
+    # It took leave, and did not take the goodbye for a new master.
+    assert not ros1.master.publishers("/amcl_pose")
+    assert "registering anew" not in node.said
 
 
 def test_another_master_is_told_everything_anew(ros1: Lab) -> None:

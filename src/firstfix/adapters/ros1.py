@@ -131,12 +131,14 @@ def _begin(arguments: list[str]) -> Any:
 def _spin(services: list[rospy.Service]) -> None:
     """Wait for the end; meanwhile, rospy does not notice when another master takes over."""
     is_known = True
-    while not rospy.is_shutdown():
+    while True:
         rospy.rostime.wallsleep(_MASTER_CHECK_S)
-        if is_known and is_forgotten():
+        is_new = is_forgotten()
+        if rospy.is_shutdown():
+            return  # which is why the master does not know this node any more
+        if is_new:
             rospy.logwarn("the master was restarted: registering anew")
-            is_known = False
-        if not is_known:
+        if is_new or not is_known:
             is_known = register_anew(services)
 
 

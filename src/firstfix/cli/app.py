@@ -7,7 +7,9 @@ stderr; 130 interrupted.
 from __future__ import annotations
 
 import gc
+import os
 import sys
+import threading
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -25,6 +27,8 @@ from firstfix.cli.track import track
 from firstfix.core.errors import FirstfixError
 
 WRONG_INPUT = 2
+# The thread of a node that thinks; a node that ends does not wait for it longer than some seconds.
+THINKER = "firstfix"
 
 app = typer.Typer(
     name="firstfix",
@@ -94,4 +98,9 @@ def main() -> None:
     gc.set_threshold(200_000, 20, 100)
     status = run()
     gc.freeze()
+    if any(thread.name == THINKER for thread in threading.enumerate()):
+        # It is in the compiler, which an ending interpreter would pull the memory from under.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
     sys.exit(status)
