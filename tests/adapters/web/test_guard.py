@@ -25,8 +25,9 @@ def site():
         yield site
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def locked():
+    # One for each test: who asks with wrong tokens is soon kept waiting.
     with fed(Access(TOKEN)) as site:
         yield site
 

@@ -124,15 +124,22 @@ class Guard:
             return
 
         async def send_hardened(message: Message) -> None:
-            if message["type"] in {"http.response.start", "websocket.http.response.start"}:
+            if message["type"] == "http.response.start":
                 MutableHeaders(scope=message).update(HARDENING)
             await send(message)
 
         refusal = self._refusal(scope)
-        await (refusal or self._app)(scope, receive, send_hardened)
+        if refusal is None:
+            await self._app(scope, receive, send_hardened)
+        elif scope["type"] == "http":
+            await refusal(scope, receive, send_hardened)
+        else:
+            await send({"type": "websocket.close"})  # to clients: 403
 
     def _refusal(self, scope: Scope) -> Response | None:
         headers = Headers(scope=scope)
+        if "\0" in scope["path"]:
+            return problem(404, "no name has a zero in it")
         host = headers.get("host", "")
         if self._access.loopback_only and not _is_loopback(host):
             # Another name for this machine is how a web site of others would get in.
