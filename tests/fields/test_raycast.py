@@ -98,7 +98,7 @@ def test_walking_finds_the_nearest_of_all_occupied_cells(share):
         assert cast_ray(occupied, x, y, heading, math.inf) == pytest.approx(nearest, abs=1e-9)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=2 * settings.default.max_examples, deadline=None)
 @given(maps, coordinates, coordinates, headings, st.floats(0, 50) | st.just(math.inf))
 def test_leaping_is_walking_to_the_last_bit(occupied, x, y, heading, reach):
     assert leap(occupied, x, y, heading, reach) == cast_ray(occupied, x, y, heading, reach)

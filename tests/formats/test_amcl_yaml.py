@@ -215,7 +215,10 @@ VALUES = st.recursive(
 NAMES = st.sampled_from([entry.name for entry in fields(AmclConfig)]) | st.text(max_size=5)
 
 
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=2 * settings.default.max_examples,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(st.dictionaries(NAMES, VALUES, max_size=3))
 def test_any_values_become_settings_or_one_sentence(load, said):
     refusal = ""

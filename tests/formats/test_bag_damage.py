@@ -90,7 +90,9 @@ def whole(new_bag, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=2 * settings.default.max_examples,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(data=st.data(), storage=st.sampled_from(STORAGES))
 def test_damage_is_always_a_scan_error(

@@ -325,7 +325,7 @@ def test_the_kinds_of_the_fuzz_tests_load(folder, kind):
     assert load_map(path).cells.shape == (7, 5)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=2 * settings.default.max_examples, deadline=None)
 @given(
     kind=st.sampled_from(sorted(IMAGES)),
     edits=st.lists(st.tuples(st.integers(0, 250), st.integers(0, 255)), max_size=4),

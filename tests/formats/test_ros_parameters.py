@@ -109,13 +109,19 @@ def refusal(read, text: str | bytes) -> str:
     return ""
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=2 * settings.default.max_examples,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(st.dictionaries(KEYS, TREES, max_size=4))
 def test_any_tree_is_read_or_refused_in_our_words(read, tree):
     assert "\n" not in refusal(read, yaml.safe_dump(tree))
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=2 * settings.default.max_examples,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(st.binary(max_size=60))
 def test_any_bytes_are_read_or_refused_in_our_words(read, data):
     assert "\n" not in refusal(read, data)

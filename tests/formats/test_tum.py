@@ -155,7 +155,10 @@ def test_a_folder_that_does_not_exist(tmp_path: Path):
 WORDS = st.sampled_from(["0", "1", "-1", "0.5", "nan", "1e308", "#", "x", "\n", "\0", "1e-320"])
 
 
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=2 * settings.default.max_examples,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(st.binary(max_size=80) | st.lists(WORDS, max_size=24).map(lambda w: " ".join(w).encode()))
 def test_any_bytes_become_a_trajectory_or_one_sentence(load, data):
     refusal = ""
