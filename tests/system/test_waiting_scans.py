@@ -131,3 +131,12 @@ def test_a_robot_that_landed_before_the_clock_was_set_back_is_found_by_the_new_t
     robot.tell(Reset(5.0))
     robot.tell(Odometry(5.0, robot.T_odom_base))
     assert poses_of(robot.tell(robot.scan())) != []
+
+
+def test_a_reset_says_that_the_robot_stands(robot_in, hall_plan):
+    """Its base was restarted in the air, and nobody has heard it land."""
+    robot = robot_in(hall_plan, SE2(1.5, 1.5, 0.0))
+    lifted(robot, active=True)
+    assert robot.tick() == []
+    robot.tell(Reset(robot.stamp))
+    assert poses_of(robot.tick()) != []

@@ -61,11 +61,6 @@ class Intake:
         self._pressed: set[tuple[Heard, int]] = set()
         self._map_key = self._map_key_before = ""
 
-    @property
-    def map_key(self) -> str:
-        """Key of the map in use; empty before the first."""
-        return self._map_key
-
     def take(self, heard: Heard, message: Any) -> list[Input]:
         """Convert a message.
 
@@ -89,12 +84,11 @@ class Intake:
         if heard is Heard.SCAN:
             return self._take_scan(message)
         if heard is Heard.TF:
-            back = self._frames.move(to_transform(t) for t in message.transforms)
-            return self._go_on(back)
+            return self._go_on(self._frames.move(map(to_transform, message.transforms)))
         if heard is Heard.ODOM:
             return self._go_on(self._frames.move_by_topic(to_odometry(message)))
         if heard is Heard.TF_STATIC:
-            self._frames.fix(to_transform(t) for t in message.transforms)
+            self._frames.fix(map(to_transform, message.transforms))
             return self._go_on(0.0)
         if heard is Heard.MAP:
             return self._take_map(message)
@@ -103,7 +97,7 @@ class Intake:
         if heard is Heard.INPUT:
             return self.use_map(message) if isinstance(message, NewMap) else [message]
         if heard is Heard.RESET:
-            return [Reset(self._now)]
+            return [self._reset()]
         if heard is Heard.UPDATE:
             return [NoMotionUpdate(self._now)]
         return self._take_event(heard, message)
@@ -124,6 +118,10 @@ class Intake:
     def _now(self) -> float:
         """Stamp of the newest odometry, for messages that have none."""
         return max(0.0, self._frames.told_until)
+
+    def _reset(self) -> Reset:
+        self._pressed.clear()
+        return Reset(self._now)
 
     def _take_scan(self, message: Any) -> list[Input]:
         stamp, frame = to_seconds(message.header.stamp), to_frame(message.header.frame_id)
@@ -161,7 +159,7 @@ class Intake:
         inputs: list[Input] = [*self._frames.news()]
         if back_s > 0.0:
             self._complain("clock", f"time went back by {back_s:.1f} s: beginning anew")
-            return [Reset(self._now), *inputs]
+            return [self._reset(), *inputs]
         # Of the scans that are known now, the newest wins.
         known = [taken for message in waiting if (taken := self._take_waited(message))]
         return [*inputs, *(known[-1] if known else ())]

@@ -130,6 +130,7 @@ class Localizer:
         if isinstance(given, PoseHint):
             return self._take_hint(given)
         if isinstance(given, Reset):
+            self._lifted.clear()  # of a base that was restarted in the air, nobody hears it land
             return [self._forget(given.stamp, Event.RESET, "told to search anew")]
         return self._take_update_request(given)
 
