@@ -70,6 +70,7 @@ def test_a_simulated_robot_is_served_until_ctrl_c() -> None:
         assert (process.returncode, out, err) == (0, "", "")
 
 
+@pytest.mark.slow
 def test_the_robot_of_the_demo_sleeps_until_somebody_looks() -> None:
     with running("demo", "--world", "house", "--port", 0) as (process, url):
         wait_for(url, "SEARCHING")

@@ -109,8 +109,10 @@ def serve_simulated(
     from firstfix.adapters.web.page import Page
     from firstfix.adapters.web.server import listen, make_server
     from firstfix.adapters.web.steering import Steering
+    from firstfix.global_localization.answer import check_searchable
 
     access = address.access()
+    check_searchable(grid)
     with listen(address.host, address.port) as listening:
         feed = Feed(name)
 
@@ -154,9 +156,10 @@ def serve_robot(robot: str, map_path: Path, arguments: list[str], address: Addre
     from firstfix.adapters.web.server import listen
     from firstfix.cli.nodes import runner
     from firstfix.formats.map_server import load_map
+    from firstfix.global_localization.answer import check_searchable
 
     access, run = address.access(), runner(robot)
-    load_map(map_path)  # what is wrong with it is told before anything is begun
+    check_searchable(load_map(map_path))  # what is wrong with it is told before anything is begun
     with listen(address.host, address.port) as listening:
         _tell(listening, access)
         with PageBeside(robot, map_path.stem, access, listening) as page:

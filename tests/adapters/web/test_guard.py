@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import socket
 import time
 from urllib.parse import urlsplit
 
@@ -13,6 +14,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from firstfix.adapters.web.guard import HARDENING, Access, Allowance, is_loopback
+from firstfix.adapters.web.server import listen, url_of
 
 TOKEN = "open-sesame"  # noqa: S105 - of a test
 BEARER = {"authorization": f"Bearer {TOKEN}"}
@@ -208,6 +210,22 @@ def test_loopback(host: str):
 @pytest.mark.parametrize("host", ["", "192.0.2.1", "::", "192.168.0.1", "robot", "127.0.0.1.evil"])
 def test_not_loopback(host: str):
     assert not is_loopback(host)
+
+
+@pytest.mark.parametrize(
+    ("host", "url"), [("127.0.0.1", "http://127.0.0.1:"), ("::1", "http://[::1]:")]
+)
+def test_the_url_of_an_address(host: str, url: str):
+    with listen(host, 0) as listening:
+        assert url_of(listening) == f"{url}{listening.getsockname()[1]}/"
+
+
+def test_the_url_of_all_addresses_names_the_machine():
+    class Everywhere:
+        def getsockname(self) -> tuple[str, int]:
+            return ".".join("0" * 4), 8642
+
+    assert url_of(Everywhere()) == f"http://{socket.gethostname()}:8642/"
 
 
 def test_a_right_token_is_known_whatever_its_letters():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import ipaddress
 import os
 import socket
 from collections.abc import AsyncIterator
@@ -126,6 +127,8 @@ def _why(error: OSError) -> str:
 def url_of(listening: socket.socket) -> str:
     """Return where a browser finds the page."""
     host, port = listening.getsockname()[:2]
+    if ipaddress.ip_address(host).is_unspecified:  # all addresses of this machine
+        host = socket.gethostname()
     return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
 
 
@@ -147,6 +150,8 @@ def make_server(page: Page) -> uvicorn.Server:
         # Not every request: what was asked for is nobody's business.
         access_log=False,
         log_level="warning",
+        # Those of the program around it stay as they are: setting up others would close them.
+        log_config=None,
         http="h11",
         limit_concurrency=_MOST_CONNECTIONS,
         # Anybody can write them: a proxy that is to be believed would have to be named.
