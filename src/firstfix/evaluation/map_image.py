@@ -72,7 +72,9 @@ def greys_of_blocks(grid: OccupancyGrid, step: int) -> NDArray[np.uint8]:
     if step == 1:
         return grey
     blocks = np.pad(grey, [(0, -grid.height % step), (0, -grid.width % step)], mode="edge")
-    darkest: NDArray[np.uint8] = blocks.reshape(
-        len(blocks) // step, step, blocks.shape[1] // step, step
-    ).min(axis=(1, 3))
+    # One pass for each place in a block: a minimum over two axes at once takes seven times as long.
+    darkest = blocks[::step, ::step].copy()
+    for row in range(step):
+        for column in range(step):
+            np.minimum(darkest, blocks[row::step, column::step], out=darkest)
     return darkest
