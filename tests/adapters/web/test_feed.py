@@ -95,13 +95,13 @@ def test_several_places_are_shown_with_the_scan_at_the_first():
     assert kinds(begun.feed) == ["map", "state", "hint", "found"]
 
 
-def test_a_reset_is_an_event_of_a_person_and_forgets_all():
+def test_a_reset_forgets_all_and_nothing_was_lost():
     begun = drive()
     begun.step(ASLEEP + 1)
     begun.give(Reset(begun.feed.view.stamp))
     view = begun.feed.view
     assert (view.state, view.pose, view.placed) == (State.SEARCHING, None, None)
-    assert kinds(begun.feed)[-1] == "person"
+    assert kinds(begun.feed)[-1] == "state"
 
 
 def test_particles_remember_the_pose_that_was_taken_from_them():

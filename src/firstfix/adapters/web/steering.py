@@ -53,6 +53,7 @@ class Steering:
         elif order.kind == "pick":
             self._hint(self._hypothesis(given["index"]))
         elif order.kind == "relocalize":
+            self._feed.tell("person", "asked to search anew")
             self._give(Reset(self._feed.view.stamp))
         elif self._robot is None:
             raise InputError(

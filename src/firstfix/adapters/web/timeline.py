@@ -13,7 +13,7 @@ from firstfix.system.transitions import State
 MOST_EVENTS = 200
 
 # What changes the state by itself, and has an event of its own.
-_TELLING = (NewMap, PoseHint, Reset, Signal)
+_TELLING = (NewMap, PoseHint, Signal)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +70,7 @@ class Timeline:
             self.note(given.stamp, "map", f"a map of {size}")
         elif isinstance(given, PoseHint):
             at = given.T_map_base
-            self.note(given.stamp, "hint", f"a person says: at ({at.x:.2f}, {at.y:.2f}) m")
-        elif isinstance(given, Reset):
-            self.note(given.stamp, "person", "told to search anew")
+            self.note(given.stamp, "hint", f"somebody says: at ({at.x:.2f}, {at.y:.2f}) m")
         elif isinstance(given, Signal) and given.kind.means_lifted:
             self._note_lift(given)
 
@@ -87,10 +85,11 @@ class Timeline:
                 where = f"({at.x:.2f}, {at.y:.2f}) m"
                 self.note(output.stamp, "found", f"found at {where}: {output.reason}")
             elif before is not output.state and not isinstance(given, _TELLING):
-                self._note_change(before, output)
+                self._note_change(given, before, output)
 
-    def _note_change(self, before: State, status: Status) -> None:
+    def _note_change(self, given: Input, before: State, status: Status) -> None:
         was_lost = before is State.LOCALIZED and status.state is State.SEARCHING
+        was_lost &= not isinstance(given, Reset)
         kind = "lost" if was_lost else "state"
         self.note(status.stamp, kind, f"{status.state.value}: {status.reason}")
 
