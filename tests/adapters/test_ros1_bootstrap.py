@@ -5,7 +5,9 @@ from __future__ import annotations
 import time
 
 import pytest
-from ros1_lab import Lab, wait_until
+from ros1_lab import Lab, apart, wait_until
+
+from firstfix.core.se2 import SE2
 
 pytestmark = pytest.mark.slow
 
@@ -13,7 +15,7 @@ pytestmark = pytest.mark.slow
 A_WHILE_S = 2.0
 
 
-def test_a_robot_at_rest_is_found_once(ros1: Lab) -> None:
+def test_a_robot_at_rest_is_found_once_and_latecomers_are_told(ros1: Lab) -> None:
     watcher = ros1.watch("initialpose", "amcl_pose", "localization_status", "/tf")
     ros1.node()
     ros1.robot("stand")
@@ -27,12 +29,7 @@ def test_a_robot_at_rest_is_found_once(ros1: Lab) -> None:
     assert not watcher.lines("amcl_pose")
     assert not watcher.lines("/tf", frames=["map", "odom"])
 
-
-def test_an_amcl_that_comes_late_gets_the_pose_of_now(ros1: Lab) -> None:
-    first = ros1.watch("initialpose", "localization_status")
-    ros1.node()
-    ros1.robot("stand")
-    found = first.wait_for("initialpose")
+    # An AMCL that comes late, and one that comes in its place, get the pose of now.
     for _ in range(2):
         late = ros1.watch("initialpose", "localization_status")
         now = late.wait_for("initialpose")
@@ -70,31 +67,25 @@ def test_places_that_look_alike_are_told_instead_of_a_pose(ros1: Lab) -> None:
     wait_until(lambda: not watcher.lines("hypotheses")[-1]["places"], lambda: "places stay")
 
 
-def test_the_same_map_again_changes_nothing_and_another_is_searched(ros1: Lab) -> None:
+def test_the_robot_is_searched_again_on_request_and_in_another_map(ros1: Lab) -> None:
     watcher = ros1.watch("initialpose", "localization_status")
     node = ros1.node()
     robot = ros1.robot("stand")
-    watcher.wait_for("localization_status", state="LOCALIZED")
+    found = watcher.wait_for("initialpose")
     robot.tell()
     time.sleep(A_WHILE_S)
-    assert len(watcher.lines("initialpose")) == 1
+    assert len(watcher.lines("initialpose")) == 1, "the same map came again, and was taken as new"
     assert node.said.count("SEARCHING") == 1
 
-    since = time.time()
-    robot.tell(shift=[10.0, -5.0, 1.5])
-    elsewhere = watcher.wait_for("initialpose", after=since)
-    assert ros1.error_of(elsewhere)[0] > 1.0
-    since = time.time()
-    robot.tell(shift=[-10.0, 5.0, 0.0])
-
-
-def test_services_search_anew(ros1: Lab) -> None:
-    watcher = ros1.watch("initialpose", "localization_status")
-    ros1.node()
-    robot = ros1.robot("stand")
-    watcher.wait_for("localization_status", state="LOCALIZED")
     for name in ("reinitialize_global_localization", "global_localization"):
         since = time.time()
         robot.tell(ask=name)
         assert watcher.wait_for("localization_status", since, state="SEARCHING")["level"] == 1
-        assert ros1.error_of(watcher.wait_for("initialpose", since)).is_small
+        assert ros1.error_of(watcher.wait_for("initialpose", about_after=since)).is_small
+
+    since = time.time()
+    robot.tell(shift=[10.0, -5.0, 1.5])
+    elsewhere = watcher.wait_for("initialpose", about_after=since)
+    shifted = SE2(10.0, -5.0, 1.5) @ ros1.truth_at(elsewhere["stamp"])
+    assert apart(elsewhere, shifted).is_small
+    assert not apart(elsewhere, SE2(*found["pose"])).is_small

@@ -67,7 +67,8 @@ class Ros1:
         try:
             self._publishers[topic.name].publish(message)
         except rospy.ROSException:
-            if not rospy.is_shutdown():
+            # Topics close some time before rospy says that it has shut down.
+            if not rospy.core.is_shutdown_requested():
                 raise
 
     def listeners(self, topic: Topic) -> int:
