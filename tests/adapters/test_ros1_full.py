@@ -36,8 +36,8 @@ def test_a_drive_is_followed_at_the_rate_of_the_scans(ros1: Lab) -> None:
     assert metres.max() < 0.3
     assert degrees.max() < 8.0
 
-    # Every scan counts that is not given up for a newer one, as it happens on a busy machine. Stamps
-    # rise, and each has its transform, dated ahead.
+    # Every scan counts that is not given up for a newer one, as it happens on a busy machine.
+    # Stamps rise, and each has its transform, dated ahead.
     stamps = [pose["stamp"] for pose in poses]
     assert all(a < b for a, b in pairwise(stamps))
     assert set(stamps) <= set(scans)
