@@ -64,6 +64,6 @@ def test_tags_construct_nothing(read, tmp_path):
 
 
 def test_the_longest_admitted_file_takes_little_time(read):
-    started = time.perf_counter()
+    started = time.process_time()
     read(b"a: {" + b"a," * 16_000 + b"}")
-    assert time.perf_counter() - started < 10.0  # 0.8 s on a quiet machine
+    assert time.process_time() - started < 10.0  # 0.8 s on a quiet machine

@@ -195,10 +195,10 @@ def test_a_bomb_is_refused_before_it_unpacks(tmp_path: Path) -> None:
     size = struct.pack("<L", len(stream.getvalue()) + len(zeros))
     lie = struct.pack("<L", len(stream.getvalue()) + 4 * shape[0] * shape[1])
     path.write_bytes(data.replace(size, lie))
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(ScanError, match="bytes in total"):
         load_npz(path)
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 1.0
 
 
 def test_what_is_no_archive_is_told(tmp_path: Path) -> None:
