@@ -144,6 +144,7 @@ class Visit:
 
     def __init__(self, context: BrowserContext, url: str) -> None:
         self.problems: list[str] = []
+        self._heard = 0
         self._host = urlsplit(url).hostname
         self.page: Page = context.new_page()
         self.page.on("console", self._hear)
@@ -187,12 +188,22 @@ class Visit:
         """Return the timeline, newest first."""
         return self.page.locator("#events li span").all_inner_texts()
 
-    def wait_for_event(self, pattern: str, among: int = 1000) -> re.Match[str]:
-        """Wait for an event, and return what matched."""
+    def wait_for_fix(self) -> None:
+        """Wait until a robot that is not held knows where it is."""
+        self.wait_for_map()
+        wait_until(lambda: self.data("state") != "CONNECTING", lambda: "the robot says something")
+        if self.page.is_visible("#paused"):
+            self.page.locator("#pause").click()
+        self.wait_for_state("LOCALIZED")
+        self._heard = len(self.events())
+
+    def wait_for_event(self, pattern: str) -> re.Match[str]:
+        """Wait for an event since the robot was found, and return what matched, newest first."""
 
         def found() -> re.Match[str] | None:
-            texts = self.events()[:among]
-            return next(filter(None, (re.search(pattern, text) for text in texts)), None)
+            texts = self.events()
+            news = texts[: len(texts) - self._heard]
+            return next(filter(None, (re.search(pattern, text) for text in news)), None)
 
         match: re.Match[str] = wait_until(found, lambda: f"{pattern}; {self.events()[:8]}")
         return match
@@ -221,6 +232,13 @@ class Visit:
         """Return where a place of the map is in the window."""
         scale, centre_x, centre_y, u, v = (float(value) for value in self.data("view").split())
         return u + (x - centre_x) * scale, v - (y - centre_y) * scale
+
+    def wait_for_rest(self) -> None:
+        """Wait until nothing moves: neither the robot nor the map under the eye."""
+        before = ""
+        while (now := f"{self.data('view')} {self.data('truth')}") != before:
+            before = now
+            self.page.wait_for_timeout(400)
 
     def press_and_pull(self, x: float, y: float, yaw: float, length_px: float = 60.0) -> None:
         """Press at a place of the map and pull in a direction."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ SCHEMES = pytest.mark.parametrize("scheme", ["light", "dark"])
 WALL, FREE = (0x27, 0x31, 0x3D, 255), (0xFB, 0xFC, 0xFD, 255)
 
 Visitor = Callable[..., Visit]
+Turned = tuple[OccupancyGrid, Server]
 
 
 @DEVICES
@@ -34,8 +36,7 @@ def test_the_robot_appears(
     visit: Visitor, office_server: Server, device: dict, scheme: str, tmp_path: Path
 ) -> None:
     page = visit(office_server.url, device, color_scheme=scheme)
-    page.wait_for_map()
-    page.wait_for_state("LOCALIZED")
+    page.wait_for_fix()
     assert page.page.inner_text("#state-word") == "LOCALIZED"
     assert page.page.inner_text("#map-name") == "office"
     assert "beams fit" in page.page.inner_text("#reason")
@@ -84,14 +85,20 @@ def test_fingers_hit_everything(visit: Visitor, office_server: Server) -> None:
     assert page.page.evaluate(small) == []
 
 
-@pytest.mark.parametrize("yaw", [0.0, 0.6, -2.0])
-def test_a_turned_map_lies_where_its_origin_says(
-    visit: Visitor, yaw: float, tmp_path: Path
-) -> None:
+@pytest.fixture
+def turned(chromium: Any, request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Turned]:
+    """Give a robot on a map whose origin is turned."""
     plan = WORLDS["house"]()
-    grid = OccupancyGrid(plan.cells, plan.resolution, SE2(-3.0, 7.0, yaw))
+    grid = OccupancyGrid(plan.cells, plan.resolution, SE2(-3.0, 7.0, request.param))
     save_map(grid, tmp_path / "turned.yaml")
     server = Server(str(tmp_path / "turned.yaml")).start()
+    yield grid, server
+    server.stop()
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.6, -2.0], indirect=True)
+def test_a_turned_map_lies_where_its_origin_says(turned: Turned, visit: Visitor) -> None:
+    grid, server = turned
     page = visit(server.url, color_scheme="light")
     page.wait_for_map()
     page.zoom_in(4)
@@ -103,14 +110,11 @@ def test_a_turned_map_lies_where_its_origin_says(
         assert len(visible) == 15
         for x, y in visible:
             assert page.colour("ground", x, y) == expected
-    page.page.close()
-    server.stop()
 
 
 def test_a_scene_is_drawn_only_when_it_changes(visit: Visitor, office_server: Server) -> None:
     page = visit(office_server.url)
-    page.wait_for_map()
-    page.wait_for_state("LOCALIZED")
+    page.wait_for_fix()
     page.page.click("#pause")
     page.page.wait_for_selector("#paused", state="visible")
     count = """() => new Promise((done) => {

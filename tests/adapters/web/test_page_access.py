@@ -33,8 +33,7 @@ def watched(chromium: Any) -> Iterator[Server]:
 def test_a_restarted_robot_is_found_again(visit: Visitor, chromium: Any) -> None:
     server = Server("office").start()
     page = visit(server.url)
-    page.wait_for_map()
-    page.wait_for_state("LOCALIZED")
+    page.wait_for_fix()
     server.kill()
     page.page.wait_for_selector("#connection-lost", state="visible")
     assert page.data("connected") == "false"
@@ -56,12 +55,10 @@ def test_a_restarted_robot_is_found_again(visit: Visitor, chromium: Any) -> None
 
 def test_a_link_may_have_the_token(visit: Visitor, guarded: Server) -> None:
     page = visit(f"{guarded.url}#token={TOKEN}")
-    page.wait_for_map()
-    page.wait_for_state("LOCALIZED")
+    page.wait_for_fix()
     assert page.page.url == guarded.url  # nobody reads it over a shoulder, or bookmarks it
     page.page.reload()
-    page.wait_for_map()
-    page.wait_for_state("LOCALIZED")
+    page.wait_for_fix()
     assert page.page.is_hidden("#token-dialog")
 
 
@@ -72,8 +69,7 @@ def test_who_has_no_token_is_asked_for_it(visit: Visitor, guarded: Server) -> No
         assert page.data("map") == ""
         page.page.fill("#token", token)
         page.page.keyboard.press("Enter")
-    page.wait_for_map()
-    page.wait_for_state("LOCALIZED")
+    page.wait_for_fix()
     assert page.page.is_hidden("#token-dialog")
     page.problems = [problem for problem in page.problems if "401" not in problem]
 
@@ -86,8 +82,7 @@ def test_a_token_that_has_become_wrong_is_asked_for_anew(visit: Visitor, guarded
 
 def test_who_may_only_watch_sees_no_action(visit: Visitor, watched: Server) -> None:
     page = visit(watched.url)
-    page.wait_for_map()
-    page.wait_for_state("LOCALIZED")
+    page.wait_for_fix()
     assert page.page.is_visible("#watching")
     for hidden in ("#tools", "#simulation"):
         assert page.page.is_hidden(hidden)

@@ -21,14 +21,13 @@ Visitor = Callable[..., Visit]
 def page(visit: Visitor, office_server: Server) -> Visit:
     """Give the page of a robot that knows where it is."""
     visited = visit(office_server.url)
-    visited.wait_for_map()
-    visited.wait_for_state("LOCALIZED")
+    visited.wait_for_fix()
     return visited
 
 
 def said_at(page: Visit) -> tuple[float, float]:
     """Return where the newest hint says that the robot is."""
-    match = page.wait_for_event(r"says.* \((-?[\d.]+), (-?[\d.]+)\)", among=6)
+    match = page.wait_for_event(r"says.* \((-?[\d.]+), (-?[\d.]+)\)")
     return float(match[1]), float(match[2])
 
 
@@ -37,7 +36,7 @@ def stand_still(page: Visit) -> None:
     page.page.keyboard.press("l")
     page.page.keyboard.press(" ")
     page.page.wait_for_selector("#paused", state="visible")
-    page.page.wait_for_timeout(1500)
+    page.wait_for_rest()
 
 
 def error_of(page: Visit) -> tuple[float, float]:
@@ -73,17 +72,16 @@ def test_a_press_without_a_pull_says_nothing(page: Visit) -> None:
 
 def test_a_long_press_of_a_finger_sets_the_pose(visit: Visitor, office_server: Server) -> None:
     page = visit(office_server.url, PHONE)
-    page.wait_for_map()
-    page.wait_for_state("LOCALIZED")
+    page.wait_for_fix()
     page.page.tap("#follow")
     page.page.tap("#pause")
-    page.page.wait_for_timeout(1500)
+    page.page.wait_for_selector("#paused", state="visible")
+    page.wait_for_rest()
     x, y, yaw = page.pose("truth")
     px, py = page.pixel(x, y)
     hand = Fingers(page)
     hand.touch("touchStart", [(px, py)])
-    page.page.wait_for_timeout(800)
-    assert page.data("mode") == "pose"
+    wait_until(lambda: page.data("mode") == "pose", lambda: "a long press")
     for reach in (20.0, 50.0):
         hand.touch("touchMove", [(px + reach * math.cos(yaw), py - reach * math.sin(yaw))])
     hand.touch("touchEnd", [])
@@ -241,8 +239,7 @@ def test_people_come_and_go(page: Visit) -> None:
 @pytest.mark.parametrize("device", [DESKTOP, PHONE], ids=["desktop", "phone"])
 def test_what_is_shown_can_be_chosen(visit: Visitor, office_server: Server, device: dict) -> None:
     page = visit(office_server.url, device)
-    page.wait_for_map()
-    page.wait_for_state("LOCALIZED")
+    page.wait_for_fix()
     if device is PHONE:
         page.page.tap("#sheet-handle")
     for chip in page.page.locator(".chip").all():

@@ -22,8 +22,7 @@ SCHEMES = pytest.mark.parametrize("scheme", ["light", "dark"])
 def page(visit: Visitor, office_server: Server) -> Visit:
     """Give the page of a robot that knows where it is."""
     visited = visit(office_server.url)
-    visited.wait_for_map()
-    visited.wait_for_state("LOCALIZED")
+    visited.wait_for_fix()
     return visited
 
 
@@ -53,7 +52,7 @@ def test_keys_set_the_pose(page: Visit) -> None:
     keyboard.press("l")
     keyboard.press(" ")
     page.page.wait_for_selector("#paused", state="visible")
-    page.page.wait_for_timeout(1500)
+    page.wait_for_rest()
     scale, *_ = view_of(page)
     x, y, _ = page.pose()
     keyboard.press("p")
@@ -62,7 +61,7 @@ def test_keys_set_the_pose(page: Visit) -> None:
         keyboard.press("ArrowRight")
     keyboard.press("Shift+ArrowLeft")
     keyboard.press("Enter")
-    match = page.wait_for_event(r"says.* \((-?[\d.]+), (-?[\d.]+)\)", among=6)
+    match = page.wait_for_event(r"says.* \((-?[\d.]+), (-?[\d.]+)\)")
     said = float(match[1]), float(match[2])
     assert math.dist(said, (x + 24.0 / scale, y)) < 0.05
     assert page.data("mode") == "look"

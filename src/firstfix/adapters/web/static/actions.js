@@ -33,7 +33,8 @@ export class Actions {
     byId("leave-mode").addEventListener("click", () => this.leaveMode());
     byId("relocalize").addEventListener("click", () => this.relocalize());
     byId("pause").addEventListener("click", () => this.togglePause());
-    byId("people").addEventListener("input", () => this.#setPeople());
+    byId("people").addEventListener("input", () => this.#showPeople());
+    byId("people").addEventListener("change", () => this.#setPeople());
     byId("add-person").addEventListener("click", () => {
       byId("people").stepUp();
       this.#setPeople();
@@ -140,10 +141,13 @@ export class Actions {
     this.notices.complain("Press, then pull in the direction in which the robot looks.");
   }
 
+  #showPeople() {
+    byId("people-count").value = byId("people").value;
+  }
+
   #setPeople() {
-    const count = Number(byId("people").value);
-    byId("people-count").value = count;
-    this.#send({ type: "people", count });
+    this.#showPeople();
+    this.#send({ type: "people", count: Number(byId("people").value) });
   }
 
   #send(message) {

@@ -13,9 +13,7 @@ import { Sheet } from "./sheet.js";
 import { Stage } from "./stage.js";
 import { Theme } from "./theme.js";
 import { Timeline } from "./timeline.js";
-import {
-  authorization, forgetToken, keepToken, takeTokenFromFragment, token,
-} from "./token.js";
+import { authorization, keepToken, takeTokenFromFragment, token } from "./token.js";
 import { View } from "./view.js";
 import { metres } from "./words.js";
 
@@ -82,16 +80,18 @@ function takeState(state) {
 async function showMap(map) {
   panel.showMap(map);
   if (scene.image && JSON.stringify(map) === JSON.stringify(scene.map)) return;
-  try {
-    scene.image = await pictureOf(map);
-  } catch (problem) {
-    notices.complain(`The picture of the map did not come: ${problem.message}.`);
-    return;
-  }
   scene.map = map;
+  scene.image = null;
   view.bounds = boundsOf(map);
-  stage.recolour();
+  stage.resize(sheet.covered());
   camera.fit();
+  const image = await pictureOf(map).catch((problem) => {
+    notices.complain(`The picture of the map did not come: ${problem.message}.`);
+    return null;
+  });
+  if (scene.map !== map || !image) return; // another map came meanwhile
+  scene.image = image;
+  stage.recolour();
   app.dataset.map = map.name;
   performance.mark("map-shown");
 }
@@ -106,7 +106,7 @@ function askForToken() {
   app.dataset.connected = "false";
   byId("token-text").textContent =
     token() ? "That was not the right one." : "Whoever started firstfix has it. This tab keeps it.";
-  forgetToken();
+  keepToken(null);
   const dialog = byId("token-dialog");
   if (!dialog.open) dialog.showModal();
 }

@@ -7,6 +7,7 @@ export class Sheet {
   #panel = document.getElementById("panel");
   #handle = document.getElementById("sheet-handle");
   #narrow = matchMedia(NARROW);
+  #headPx = 0;
   #startY = 0;
   #swiped = false;
 
@@ -38,13 +39,17 @@ export class Sheet {
       const bottom = tools.hidden ? 0 : tools.offsetHeight;
       return { left: view.right, top: 0, right: innerWidth - box.left, bottom };
     }
-    const head = document.getElementById("state").getBoundingClientRect().bottom - box.top + 10;
-    document.getElementById("app").style.setProperty("--sheet-head", `${head}px`);
-    return { left: 0, top: 0, right: 0, bottom: head + (tools.hidden ? 0 : tools.offsetHeight + 8) };
+    const state = document.getElementById("state").getBoundingClientRect();
+    // Words come and go; buttons that moved with them would be missed by a thumb.
+    this.#headPx = Math.max(this.#headPx, state.bottom - box.top + 10);
+    document.getElementById("app").style.setProperty("--sheet-head", `${this.#headPx}px`);
+    const bottom = this.#headPx + (tools.hidden ? 0 : tools.offsetHeight + 8);
+    return { left: 0, top: 0, right: 0, bottom };
   }
 
   #open(open) {
     this.#handle.setAttribute("aria-expanded", String(open));
+    this.#panel.dataset.open = String(open);
     this.#handle.setAttribute("aria-label", open ? "Hide details" : "Show details");
     this.onChange();
   }

@@ -24,12 +24,15 @@ export class Stage {
   /** Fit the canvases to the window. */
   resize(covered) {
     const { clientWidth: width, clientHeight: height } = this.#overlay.parentElement;
-    for (const canvas of [this.#ground, this.#overlay]) {
-      canvas.width = Math.round(width * devicePixelRatio);
-      canvas.height = Math.round(height * devicePixelRatio);
-    }
     this.view.resize(width, height, covered);
     this.invalidate();
+    const [wide, high] = [width, height].map((side) => Math.round(side * devicePixelRatio));
+    if (this.#overlay.width === wide && this.#overlay.height === high) return;
+    for (const canvas of [this.#ground, this.#overlay]) {
+      canvas.width = wide;
+      canvas.height = high;
+    }
+    this.#frame(performance.now()); // a new size empties a canvas: the screen must not see that
   }
 
   /** The colours or the map are new. */
@@ -65,7 +68,7 @@ export class Stage {
     const { view, colours, scene } = this;
     const ctx = cleared(this.#ground, view);
     drawGrid(ctx, view, colours);
-    if (this.#coloured) drawMap(ctx, view, scene.map, this.#coloured);
+    if (scene.image && this.#coloured) drawMap(ctx, view, scene.map, this.#coloured);
   }
 
   #drawOverlay() {

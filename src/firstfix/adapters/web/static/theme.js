@@ -1,5 +1,7 @@
 /** Dark or light: as the system says, until somebody presses the button. */
 
+import { keep, recall } from "./memory.js";
+
 const KEY = "firstfix-theme";
 const BY_SYSTEM = "(prefers-color-scheme: dark)";
 const NAMES = [
@@ -10,23 +12,26 @@ const NAMES = [
 export class Theme {
   #sheet = document.getElementById("dark");
   #system = matchMedia(BY_SYSTEM);
+  #chosen = recall("localStorage", KEY);
 
   constructor() {
     this.onChange = () => {};
     this.colours = {}; // by name; the same object for good, its entries change
     this.#system.addEventListener("change", () => this.#apply());
+    // A style sheet that the system does not want is loaded last.
+    this.#sheet.addEventListener("load", () => this.#apply());
     this.#apply();
   }
 
   get isDark() {
-    const chosen = localStorage.getItem(KEY);
-    return chosen === null ? this.#system.matches : chosen === "dark";
+    return this.#chosen === null ? this.#system.matches : this.#chosen === "dark";
   }
 
   toggle() {
-    const wanted = !this.isDark;
-    if (wanted === this.#system.matches) localStorage.removeItem(KEY);
-    else localStorage.setItem(KEY, wanted ? "dark" : "light");
+    const wanted = this.isDark ? "light" : "dark";
+    const asSystem = (wanted === "dark") === this.#system.matches;
+    this.#chosen = asSystem ? null : wanted;
+    keep("localStorage", KEY, this.#chosen);
     this.#apply();
   }
 

@@ -1,6 +1,10 @@
 /** The token that a robot may ask for: kept for this tab, never in a URL that is sent or seen. */
 
+import { keep, recall } from "./memory.js";
+
 const KEY = "firstfix-token";
+
+let known = recall("sessionStorage", KEY);
 
 /** Take the token out of `#token=...`, and the fragment out of the address bar. */
 export function takeTokenFromFragment() {
@@ -10,19 +14,17 @@ export function takeTokenFromFragment() {
   history.replaceState(null, "", location.pathname + location.search);
 }
 
-export function keepToken(token) {
-  sessionStorage.setItem(KEY, token);
-}
-
-export function forgetToken() {
-  sessionStorage.removeItem(KEY);
+/** @param {?string} text null to forget it */
+export function keepToken(text) {
+  known = text;
+  keep("sessionStorage", KEY, text);
 }
 
 export function token() {
-  return sessionStorage.getItem(KEY);
+  return known;
 }
 
 /** Headers that carry the token, for fetch. */
 export function authorization() {
-  return token() === null ? {} : { Authorization: `Bearer ${token()}` };
+  return known === null ? {} : { Authorization: `Bearer ${known}` };
 }
