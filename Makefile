@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 VENV_ARGS ?= $(shell $(PYTHON) -c 'import rospy' 2>/dev/null && echo --system-site-packages)
 CASES ?= $(wildcard ../shared/cases/*/)
 
-.PHONY: demo test check bench clean
+.PHONY: demo test check bench recording clean
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV_ARGS) $(VENV)
@@ -32,6 +32,9 @@ bench: $(STAMP)
 	$(if $(strip $(CASES)),$(BIN)/firstfix bench $(CASES) --method fast --method paper --foreign \
 	    --json out/bench.json --report out/bench,@echo 'no cases in ../shared/cases: to try some, \
 	    name folders with map.yaml and scans.npz: make bench CASES="folder ..."')
+
+recording: $(STAMP)
+	$(BIN)/python benchmarks/record_demo.py docs/demo.gif
 
 clean:
 	rm -rf $(VENV) out dist build
