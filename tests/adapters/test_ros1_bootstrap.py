@@ -77,6 +77,7 @@ def test_the_robot_is_searched_again_on_request_and_in_another_map(ros1: Lab) ->
     assert len(watcher.lines("initialpose")) == 1, "the same map came again, and was taken as new"
     assert node.said.count("SEARCHING") == 1
 
+    robot.tell(ask="firstfix/request_nomotion_update")  # the name without a node is AMCL's
     for name in ("reinitialize_global_localization", "global_localization"):
         since = time.time()
         robot.tell(ask=name)

@@ -24,7 +24,7 @@ from firstfix.adapters.topics import (
 )
 from firstfix.adapters.transport import Gravity
 from firstfix.core.errors import InputError
-from firstfix.system.node_config import NodeConfig
+from firstfix.system.node_config import Mode, NodeConfig
 
 # Messages that wait for slow subscribers; after that the oldest are dropped.
 _QUEUE = 10
@@ -36,10 +36,14 @@ _LOG = {
     Gravity.WARNING: rospy.logwarn,
     Gravity.ERROR: rospy.logerr,
 }
-_SERVICES = {
+_SEARCHES = {
     "global_localization": Heard.RESET,
     "reinitialize_global_localization": Heard.RESET,
-    "request_nomotion_update": Heard.UPDATE,
+}
+# A name has one provider: an AMCL that runs beside must not lose its own.
+_SERVICES = {
+    Mode.BOOTSTRAP: {**_SEARCHES, "~request_nomotion_update": Heard.UPDATE},
+    Mode.FULL: {**_SEARCHES, "request_nomotion_update": Heard.UPDATE},
 }
 
 
@@ -107,10 +111,8 @@ def run(arguments: list[str], make_node: MakeNode = Node) -> None:
         threading.Thread(target=_ask_for_map, args=(node,), daemon=True).start()
     for what, topic in heard.items():
         _subscribe(topic, partial(node.hear, what))
-    services = [
-        rospy.Service(name, Empty, partial(_ask, node, what)) for name, what in _SERVICES.items()
-    ]
-    _spin(services)
+    names = _SERVICES[config.mode]
+    _spin([rospy.Service(name, Empty, partial(_ask, node, what)) for name, what in names.items()])
     node.stop()
 
 
