@@ -215,12 +215,13 @@ class Visit:
         """Return how large the map is, pixels per metre."""
         return float(self.data("view").split()[0])
 
-    def zoom_in(self, times: int) -> None:
-        """Zoom in on the middle of the map by the key for it."""
-        for _ in range(times):
-            scale = self.scale
-            self.page.keyboard.press("+")
-            wait_until(lambda: self.scale > scale, lambda: "it zooms")  # noqa: B023 - used at once
+    def look_at(self, x: float, y: float, scale: float = 55.0) -> None:
+        """Turn the wheel over a place of the map until it is as large (pixels per metre)."""
+        self.page.mouse.move(*self.pixel(x, y))
+        while self.scale < scale:
+            before = self.scale
+            self.page.mouse.wheel(0, -200)
+            wait_until(lambda: self.scale != before, lambda: "it zooms")  # noqa: B023 - used at once
 
     def sees(self, x: float, y: float) -> bool:
         """Tell whether a place of the map is visible, beside all bars and panels."""

@@ -47,6 +47,7 @@ export class Actions {
     this.#abilities = new Set(maySteer ? ["pose", ...abilities] : []);
     byId("tools").hidden = !maySteer;
     byId("watching").hidden = maySteer;
+    byId("places-hint").hidden = !maySteer;
     byId("mode-goal").hidden = !this.#abilities.has("goal");
     byId("mode-carry").hidden = !this.#abilities.has("carry");
     byId("pause").hidden = !this.#abilities.has("pause");

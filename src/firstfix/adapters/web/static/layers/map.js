@@ -54,17 +54,16 @@ export function boundsOf(map) {
   };
 }
 
-/** Draw the map; `canvas` is what colourMap made, its row 0 at the top. */
+/** Draw the map; `canvas` is what colourMap made: row 0 at the top, the lower-left corner the map's. */
 export function drawMap(ctx, view, map, canvas) {
   const [x0, y0, yaw] = map.origin;
   const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
-  const perColumn = (view.scale * map.width * map.resolution) / canvas.width;
-  const perRow = (view.scale * map.height * map.resolution) / canvas.height;
-  const high = map.height * map.resolution;
+  const high = canvas.height * map.image.resolution;
   const [left, top] = view.toScreen(x0 - sin * high, y0 + cos * high);
+  const size = view.scale * map.image.resolution; // px of the window per px of the image
   ctx.save();
-  ctx.transform(perColumn * cos, -perColumn * sin, perRow * sin, perRow * cos, left, top);
-  ctx.imageSmoothingEnabled = perColumn * devicePixelRatio < CRISP_FROM;
+  ctx.transform(size * cos, -size * sin, size * sin, size * cos, left, top);
+  ctx.imageSmoothingEnabled = size * devicePixelRatio < CRISP_FROM;
   ctx.imageSmoothingQuality = "medium";
   ctx.drawImage(canvas, 0, 0);
   ctx.restore();
