@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import http.client
 import socket
-import time
 from urllib.parse import urlsplit
 
 import httpx
@@ -13,7 +12,7 @@ from live_lab import Site, fed
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from firstfix.adapters.web.guard import HARDENING, Access, Allowance, is_loopback
+from firstfix.adapters.web.guard import HARDENING, Access, is_loopback
 from firstfix.adapters.web.server import listen, url_of
 
 TOKEN = "open-sesame"  # noqa: S105 - of a test
@@ -172,34 +171,6 @@ def test_nothing_outside_is_reached(site: Site, path: str):
     assert b"import" not in body
     if status != 307:
         assert headers["content-type"] == "application/problem+json"
-
-
-def test_the_end_of_an_allowance():
-    now = [0.0]
-    allowance = Allowance(rate_hz=2.0, burst=3.0, clock=lambda: now[0])
-    assert [allowance.takes("a") for _ in range(4)] == [True, True, True, False]
-    assert allowance.takes("b")
-    now[0] = 0.6
-    assert [allowance.takes("a") for _ in range(2)] == [True, False]
-    now[0] = 100.0
-    assert [allowance.takes("a") for _ in range(4)] == [True, True, True, False]
-
-
-def test_what_was_charged_has_to_be_waited_for():
-    now = [0.0]
-    allowance = Allowance(rate_hz=2.0, burst=3.0, clock=lambda: now[0])
-    allowance.charge("a", 5.0)
-    now[0] = 1.4
-    assert not allowance.takes("a")
-    now[0] = 1.6
-    assert allowance.takes("a")
-
-
-def test_a_flood_of_clients_is_forgotten():
-    allowance = Allowance(clock=time.monotonic)
-    for i in range(5000):
-        assert allowance.takes(f"{i}")
-    assert len(allowance._left) <= 1024
 
 
 @pytest.mark.parametrize("host", ["localhost", "127.0.0.1", "::1", "127.9.9.9"])

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from live_lab import Drive, Site, drive, fed, simulated, until
 from websockets.asyncio.client import connect as connect_async
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, ConnectionClosedError, InvalidStatus
 from websockets.sync.client import ClientConnection
 from websockets.sync.client import connect as connect_sync
 
@@ -203,6 +203,23 @@ def test_a_wrong_token_closes_and_nothing_is_seen(office: Drive, first: str | by
         with pytest.raises(ConnectionClosed) as ended:
             viewer.recv(PATIENCE_S)
         assert ended.value.rcvd.code == 4401
+
+
+def test_who_guesses_here_is_kept_waiting_too(office: Drive):
+    with fed(Access(TOKEN), office.feed) as site:
+
+        def guess(word: str) -> None:
+            with connect(site.live) as viewer:
+                viewer.send(json.dumps({"type": "token", "token": word}))
+                viewer.recv(PATIENCE_S)
+
+        refusals = []
+        for i in range(15):
+            with pytest.raises((ConnectionClosed, InvalidStatus)) as refusal:
+                guess(f"{i}")
+            refusals.append(refusal.type)
+        assert refusals[0] is ConnectionClosedError
+        assert InvalidStatus in refusals
 
 
 def test_without_a_token_nothing_is_seen(office: Drive, monkeypatch: pytest.MonkeyPatch):

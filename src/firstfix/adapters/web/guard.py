@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
-import time
-from collections import OrderedDict
-from collections.abc import Callable
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
@@ -14,6 +11,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from firstfix.adapters.web.allowance import WRONG_TOKEN, Allowance
 from firstfix.adapters.web.problem import problem
 
 HARDENING = {
@@ -26,14 +24,6 @@ HARDENING = {
     "x-frame-options": "DENY",
 }
 """Headers of every response."""
-
-# Requests of one client: so many a second in the long run, and so many at once. A page asks for
-# three things when it is opened.
-_RATE_HZ = 50.0
-_BURST = 100.0
-# A wrong token costs as much as so many requests: five guesses a second.
-_WRONG_TOKEN = 10.0
-_MOST_CLIENTS = 1024
 
 _READING = {"GET", "HEAD"}
 
@@ -61,46 +51,6 @@ class Access:
         return self.token is None or hmac.compare_digest(_as_bytes(token), _as_bytes(self.token))
 
 
-class Allowance:
-    """How much each client may still ask for; refills with time.
-
-    Parameters
-    ----------
-    rate_hz, burst : float
-        Requests a second, and at once.
-    clock : callable
-        Seconds since any time.
-    """
-
-    def __init__(
-        self,
-        rate_hz: float = _RATE_HZ,
-        burst: float = _BURST,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._rate_hz, self._burst, self._clock = rate_hz, burst, clock
-        self._left: OrderedDict[str, tuple[float, float]] = OrderedDict()
-
-    def takes(self, client: str) -> bool:
-        """Take one request from what a client has left; False if it has nothing left."""
-        if self._left_of(client) < 1.0:
-            return False
-        self.charge(client, 1.0)
-        return True
-
-    def charge(self, client: str, cost: float) -> None:
-        """Take so many requests from what a client has left, also if it has less."""
-        self._left[client] = (self._left_of(client) - cost, self._clock())
-        self._left.move_to_end(client)
-        if len(self._left) > _MOST_CLIENTS:
-            self._left.popitem(last=False)
-
-    def _left_of(self, client: str) -> float:
-        now = self._clock()
-        left, then = self._left.get(client, (self._burst, now))
-        return min(self._burst, left + (now - then) * self._rate_hz)
-
-
 class Guard:
     """Refuses strangers, and hardens what goes out.
 
@@ -110,12 +60,14 @@ class Guard:
         What is guarded.
     access : Access
         What is asked of clients.
+    allowance : Allowance
+        How much they may ask for.
     """
 
-    def __init__(self, app: ASGIApp, access: Access) -> None:
+    def __init__(self, app: ASGIApp, access: Access, allowance: Allowance) -> None:
         self._app = app
         self._access = access
-        self._allowance = Allowance()
+        self._allowance = allowance
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request or connection."""
@@ -150,12 +102,12 @@ class Guard:
             return problem(403, "pages of other sites may not ask for this")
         if scope["path"] == "/" or scope["path"].startswith("/static/"):
             return None
-        client = (scope.get("client") or ("?", 0))[0]
+        client = client_of(scope)
         if not self._allowance.takes(client):
             return problem(429, "too many requests", {"retry-after": "1"})
         # A browser cannot give headers to a WebSocket: there the first message has the token.
         if scope["type"] == "http" and not self._knows_token(headers):
-            self._allowance.charge(client, _WRONG_TOKEN)
+            self._allowance.charge(client, WRONG_TOKEN)
             return problem(401, "a token is needed", {"www-authenticate": "Bearer"})
         return None
 
@@ -164,6 +116,12 @@ class Guard:
         return self._access.token is None or (
             kind.lower() == "bearer" and self._access.knows(token.strip())
         )
+
+
+def client_of(scope: Scope) -> str:
+    """Return the address of who asks."""
+    address, _ = scope.get("client") or ("?", 0)
+    return str(address)
 
 
 def is_loopback(host: str) -> bool:

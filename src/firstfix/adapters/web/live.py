@@ -7,7 +7,8 @@ from contextlib import suppress
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from firstfix.adapters.web.guard import Access, Allowance
+from firstfix.adapters.web.allowance import WRONG_TOKEN, Allowance
+from firstfix.adapters.web.guard import Access, client_of
 from firstfix.adapters.web.hub import Hub, Viewer
 from firstfix.adapters.web.orders import order_of
 from firstfix.adapters.web.page import Page
@@ -38,6 +39,7 @@ async def live(socket: WebSocket, hub: Hub, page: Page) -> None:
     """
     await socket.accept()
     if not await _knows_token(socket, page.access):
+        page.allowance.charge(client_of(socket.scope), WRONG_TOKEN)
         await socket.close(_NO_TOKEN, "a token is needed")
         return
     viewer = hub.join()

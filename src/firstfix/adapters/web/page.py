@@ -8,6 +8,7 @@ from typing import Any
 
 from starlette.exceptions import HTTPException
 
+from firstfix.adapters.web.allowance import Allowance
 from firstfix.adapters.web.feed import Feed
 from firstfix.adapters.web.guard import Access
 from firstfix.adapters.web.map_image import MapPictures
@@ -36,6 +37,8 @@ class Page:
         What is asked of clients.
     greet : callable
         Called when the first viewer comes.
+    allowance : Allowance
+        How much clients may still ask for.
     pictures : MapPictures
         Of maps.
     """
@@ -45,6 +48,7 @@ class Page:
     steering: Steering
     access: Access = field(default_factory=Access)
     greet: Callable[[], None] = _greet_nobody
+    allowance: Allowance = field(default_factory=Allowance)
     pictures: MapPictures = field(default_factory=MapPictures)
 
     def hello(self) -> str:

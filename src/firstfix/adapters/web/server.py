@@ -76,7 +76,7 @@ def make_app(page: Page) -> ASGIApp:
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
     app = Starlette(routes=routes, lifespan=lifespan, exception_handlers=HANDLERS)
-    return Guard(app, page.access)
+    return Guard(app, page.access, page.allowance)
 
 
 def listen(host: str, port: int) -> socket.socket:
