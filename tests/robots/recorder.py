@@ -95,8 +95,8 @@ class Speaker:
         return [hear(Heard.TF, self.tf()), hear(Heard.SCAN, self.scan())]
 
 
-def wait_for(what: Callable[[], Any], seconds: float = 60.0) -> Any:
-    """Wait until something is so, and return it; on a busy machine that may take long."""
+def wait_for(what: Callable[[], Any], seconds: float = 240.0) -> Any:
+    """Wait until something is so, and return it; the kernels may have to be compiled first."""
     end = time.monotonic() + seconds
     while not (found := what()):
         assert time.monotonic() < end, "it has not happened"
