@@ -29,7 +29,7 @@ LOOPBACK = (
 # Types that are not what they claim to be must not keep the ears of the tests shut.
 NAMES_COUNT = "<Compatibility><IgnoreTypeInformation>1.16</IgnoreTypeInformation></Compatibility>"
 # A busy machine is not a bug: generous, since nobody waits so long when all is well.
-PATIENCE_S = 90.0
+PATIENCE_S = 240.0
 
 _counter = itertools.count(os.getpid() * 7)
 Found = TypeVar("Found")

@@ -23,7 +23,7 @@ from firstfix.sim.world import WORLDS
 from firstfix.system.inputs import Input, NewMap
 from firstfix.system.localizer import Localizer
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 
 
 def until(holds: Callable[[], Any], what: str = "it", patience_s: float = WAIT_S) -> Any:
