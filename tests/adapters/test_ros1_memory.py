@@ -26,6 +26,7 @@ def test_in_one_of_four_equal_rooms_a_node_that_is_restarted_knows_its_room(
     here = ros1.truth_at(watcher.wait_for("scan")["stamp"])
     robot.tell(hint=[here.x, here.y, here.yaw])
     watcher.wait_for("localization_status", state="LOCALIZED")
+    robot.tell(gone=True)
     wait_until(file.exists, lambda: f"no {file}; {first.said}")
     first.send(end)
     first.wait()

@@ -2,8 +2,8 @@
 
 Such a line is JSON: ``flaws`` (names of `FLAWS`, instead of those before), ``shift`` (x, y, yaw:
 the map moves by that much, the robot does not), ``ask`` (a service without arguments), ``hint``
-(x, y, yaw: a person says where the robot is), ``go`` (on with the script). After each, map and
-fixed transforms are published anew.
+(x, y, yaw: a person says where the robot is), ``gone`` (that person), ``go`` (on with the script).
+After each, map and fixed transforms are published anew.
 """
 
 from __future__ import annotations
@@ -125,6 +125,8 @@ class Robot:
             where = SE2(*told["hint"])
             said = pose_with_covariance(make, 0.0, "map", where, np.diag([0.25, 0.25, 0.07]))
             self._publishers["initialpose"].publish(said)
+        if "gone" in told:  # the person, whose word would be latched for others that come later
+            self._publishers.pop("initialpose").unregister()
         if "go" in told:
             TOLD.set()
         if "ask" in told:
