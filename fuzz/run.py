@@ -13,6 +13,13 @@ from pathlib import Path
 
 import atheris
 
+with atheris.instrument_imports(include=["firstfix"]):
+    import firstfix.core.grid
+    import firstfix.core.recording
+# Not the layers of kernels: instrumented, those do not compile.
+import firstfix.global_localization.locate
+import firstfix.system.localizer  # noqa: F401
+
 with atheris.instrument_imports(include=["firstfix", "rosbags"]):
     from targets import TARGETS, seeds, try_one
 

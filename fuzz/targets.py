@@ -1,33 +1,56 @@
-"""What is fuzzed: every reader, with bytes that somebody else chose.
+"""What is fuzzed: every reader, of files and of what comes over a network.
 
-A target takes bytes, and may raise nothing but errors of ours; `seeds` makes good ones.
+A target takes bytes that somebody else chose, and may raise nothing but errors of ours; `seeds`
+makes good ones.
 """
 
 from __future__ import annotations
 
+import asyncio
+import functools
 import gzip
 import io
 import tempfile
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from rosbags.interfaces import Nodetype
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
+from starlette.exceptions import HTTPException
 
+from firstfix.adapters.ros_arguments import settings_from
+from firstfix.adapters.web.body import JSON, NPZ
+from firstfix.adapters.web.locate_api import LocateDesk
+from firstfix.adapters.web.orders import order_of
+from firstfix.adapters.web.strict_json import parsed
+from firstfix.adapters.web.view import ShownMap
 from firstfix.core.errors import FirstfixError
 from firstfix.core.grid import OccupancyGrid
+from firstfix.core.scan import Mounting
 from firstfix.core.se2 import SE2
 from firstfix.formats.amcl_yaml import load_amcl_config
 from firstfix.formats.map_check import check_map
 from firstfix.formats.map_server import load_map, save_map
+from firstfix.formats.messages import (
+    to_grid,
+    to_laser_scan,
+    to_odometry,
+    to_planar,
+    to_pose,
+    to_transform,
+)
 from firstfix.formats.recording import load_recording
 from firstfix.formats.saved_pose import SavedPose, load_pose, save_pose
 from firstfix.formats.tum import load_tum
+from firstfix.global_localization.locate import Locator
 
 MAX_CELLS = 1_000_000
 _HEADER = b"image: map.%s\nresolution: 0.05\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n"
@@ -99,6 +122,64 @@ def read_tum(data: bytes, folder: Path) -> None:
     load_tum(folder / "track.tum")
 
 
+def read_node_parameters(data: bytes, folder: Path) -> None:
+    """Read a parameter file of the node."""
+    (folder / "node.yaml").write_bytes(data)
+    settings_from(
+        node="firstfix", amcl_file=None, files=[folder / "node.yaml"], assignments=[], options={}
+    )
+
+
+def read_node_argument(data: bytes, _: Path) -> None:
+    """Read a parameter from the command line."""
+    text = data.decode(errors="replace")
+    settings_from(node="firstfix", amcl_file=None, files=[], assignments=[text], options={})
+
+
+def read_order(data: bytes, _: Path) -> None:
+    """Read what a viewer of the live page asks for."""
+    order_of(parsed(data))
+
+
+def _search_for(kind: str) -> Target:
+    def read(data: bytes, _: Path) -> None:
+        with suppress(HTTPException):
+            asyncio.run(LocateDesk().answer(data, kind, None, _small_map()))
+
+    return read
+
+
+@functools.cache
+def _small_map() -> ShownMap:
+    cells = np.zeros((40, 60), np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = cells[20, 10:30] = 100
+    grid = OccupancyGrid(cells, 0.1)
+    return ShownMap("small", "key", grid, Locator(grid))
+
+
+# What each type of message is made into; with DDS, its bytes come from whoever is in the network.
+_CONVERSIONS: dict[str, Callable[[Any], object]] = {
+    "sensor_msgs/LaserScan": lambda message: to_laser_scan(
+        message, T_base_laser=SE2(0.0, 0.0, 0.0), mounting=Mounting.UPRIGHT
+    ),
+    "nav_msgs/OccupancyGrid": to_grid,
+    "nav_msgs/Odometry": lambda message: to_planar(to_odometry(message)),
+    "geometry_msgs/PoseWithCovarianceStamped": lambda message: to_planar(to_pose(message)),
+    "tf2_msgs/TFMessage": lambda message: [
+        to_planar(to_transform(one)) for one in message.transforms
+    ],
+}
+
+
+def _cdr_of(kind: str) -> Target:
+    def read(data: bytes, _: Path) -> None:
+        from firstfix.adapters.dds_types import decode
+
+        _CONVERSIONS[kind](decode(kind, data))
+
+    return read
+
+
 TARGETS: dict[str, Target] = {
     "map_yaml": read_map_yaml,
     "map_pgm": _image_of("pgm"),
@@ -114,7 +195,14 @@ TARGETS: dict[str, Target] = {
     "parameters": read_parameters,
     "saved_pose": read_saved_pose,
     "tum": read_tum,
+    "node_parameters": read_node_parameters,
+    "node_argument": read_node_argument,
+    "order": read_order,
+    "locate_json": _search_for(JSON),
+    "locate_npz": _search_for(NPZ),
 }
+if find_spec("cyclonedds"):
+    TARGETS |= {f"cdr_{kind.partition('/')[2]}": _cdr_of(kind) for kind in _CONVERSIONS}
 
 
 def try_one(name: str, data: bytes) -> None:
@@ -125,7 +213,9 @@ def try_one(name: str, data: bytes) -> None:
 
 def seeds(name: str, folder: Path) -> Iterator[bytes]:
     """Make good inputs of a target."""
-    if name == "map_yaml":
+    if name in ("order", "locate_json", "locate_npz") or name.startswith(("cdr_", "node_")):
+        yield from _from_others(name)
+    elif name == "map_yaml":
         yield _HEADER % b"pgm" + _THRESHOLDS
         yield _HEADER % b"pgm" + _THRESHOLDS + b"mode: scale\n"
     elif name.startswith("map_"):
@@ -150,6 +240,54 @@ def seeds(name: str, folder: Path) -> Iterator[bytes]:
         yield (folder / "pose.json").read_bytes()
     else:
         yield b"# t x y z qx qy qz qw\n1.0 2.0 3.0 0.0 0.0 0.0 0.0 1.0\n"
+
+
+def _from_others(name: str) -> Iterator[bytes]:
+    if name == "order":
+        yield b'{"type": "pose", "x": 1.5, "y": -2, "yaw": 0.1}'
+        yield b'{"type": "people", "count": 5}'
+    elif name == "locate_json":
+        yield (
+            b'{"ranges": [1.0, 2.0, null, 1.5], "angle_min": -1.0, "angle_increment": 0.5, '
+            b'"range_min": 0.1, "range_max": 10.0, "T_base_laser": [0.1, 0.0, 0.0], "map": "small"}'
+        )
+    elif name == "locate_npz":
+        buffer = io.BytesIO()
+        np.savez(buffer, ranges=np.ones((1, 10), np.float32), angle_min=-1.0, angle_increment=0.1,
+                 range_min=0.1, range_max=10.0)  # fmt: skip
+        yield buffer.getvalue()
+    elif name == "node_parameters":
+        yield b"firstfix:\n  ros__parameters:\n    mode: full\n    alpha1: 0.1\n"
+    elif name == "node_argument":
+        yield b"mode:=full"
+        yield b"alpha1:=0.1"
+    else:
+        store, kind = get_typestore(Stores.ROS2_IRON), name.removeprefix("cdr_")
+        full = next(one for one in _CONVERSIONS if one.endswith("/" + kind)).replace("/", "/msg/")
+        message = _scan(store) if kind == "LaserScan" else _good(store, full)
+        yield bytes(store.serialize_cdr(message, full))
+
+
+def _good(store: Any, kind: str) -> Any:
+    """Make a message that says something: places are (1, 2, 0), lists have one element."""
+    made = {}
+    for field, (node, detail) in store.fielddefs[kind][1]:
+        if node == Nodetype.NAME:
+            made[field] = _good(store, detail)
+        elif node == Nodetype.BASE:
+            made[field] = "map" if detail[0] == "string" else _plain(field)
+        elif detail[0][0] == Nodetype.NAME:
+            made[field] = [_good(store, detail[0][1])]
+        else:
+            dtype = np.dtype(detail[0][1][0])
+            made[field] = np.zeros(detail[1] or 1, dtype)
+    return store.types[kind](**made)
+
+
+def _plain(field: str) -> int | float:
+    return {"width": 1, "height": 1, "sec": 1, "nanosec": 5}.get(field, 0) or float(
+        field in ("w", "x", "resolution")
+    )
 
 
 def _images(kind: str, folder: Path) -> Iterator[bytes]:
