@@ -9,6 +9,7 @@ import typer
 
 from firstfix.cli.progress import progress
 from firstfix.cli.targets import check_targets, write_json
+from firstfix.cli.worlds import worlds_of
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -119,15 +120,7 @@ def _worlds(text: str | None) -> list[str]:
 
     if text is None:
         return [name for name in WORLDS if name not in _HOPELESS]
-    names = list(dict.fromkeys(name.strip() for name in text.split(",")))
-    unknown = [name for name in names if name not in WORLDS]
-    if unknown:
-        raise InputError(
-            expected=f"--worlds of {', '.join(WORLDS)}",
-            received=", ".join(repr(name) for name in unknown),
-            remedy="put commas between their names, as in --worlds office,house",
-        )
-    return names
+    return worlds_of(text, WORLDS)
 
 
 def _tasks(

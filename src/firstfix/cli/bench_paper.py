@@ -8,7 +8,7 @@ import typer
 
 from firstfix.cli.progress import progress
 from firstfix.cli.targets import check_targets, write_json
-from firstfix.core.errors import InputError
+from firstfix.cli.worlds import worlds_of
 
 DRIVES = 5
 
@@ -46,7 +46,7 @@ def bench_paper(
     """
     from firstfix.cli.paper_play import DRIVE_S, PAPER_WORLDS, PaperTask
 
-    names = list(PAPER_WORLDS) if worlds is None else _known(worlds, list(PAPER_WORLDS))
+    names = list(PAPER_WORLDS) if worlds is None else worlds_of(worlds, PAPER_WORLDS)
     check_targets(json_file, report)
     from firstfix.evaluation.apart import run_apart
     from firstfix.evaluation.machine import this_machine
@@ -67,15 +67,3 @@ def bench_paper(
 
         page = write_paper_report([ended.shown for ended in played], document, report)
         typer.echo(f"report: {page}", err=True)
-
-
-def _known(text: str, known: list[str]) -> list[str]:
-    names = list(dict.fromkeys(name.strip() for name in text.split(",")))
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        raise InputError(
-            expected=f"--worlds of {', '.join(known)}",
-            received=", ".join(repr(name) for name in unknown),
-            remedy="put commas between their names, as in --worlds laboratory,house",
-        )
-    return names

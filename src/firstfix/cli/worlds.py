@@ -8,7 +8,40 @@ from typing import TYPE_CHECKING
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from firstfix.core.grid import OccupancyGrid
+
+
+def worlds_of(text: str, known: Collection[str]) -> list[str]:
+    """Read names of worlds with commas between.
+
+    Parameters
+    ----------
+    text : str
+        What was given as ``--worlds``.
+    known : collection of str
+        What there is to choose from.
+
+    Returns
+    -------
+    list of str
+        The names, each once.
+
+    Raises
+    ------
+    InputError
+        If one of them is not known.
+    """
+    names = list(dict.fromkeys(name.strip() for name in text.split(",")))
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise InputError(
+            expected=f"--worlds of {', '.join(known)}",
+            received=", ".join(repr(name) for name in unknown),
+            remedy="put commas between their names, as in --worlds laboratory,house",
+        )
+    return names
 
 
 def world_or_map(name: str) -> OccupancyGrid:
