@@ -1,0 +1,218 @@
+"""The kernels that prepare a map."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import counts
+import limits
+import numpy as np
+from kernel import Kernel
+from numpy.typing import NDArray
+
+from firstfix.core.grid import OccupancyGrid
+from firstfix.fields import (
+    clearance,
+    distance_kernels,
+    endpoint_field,
+    range_table,
+    raycast,
+    search_grid,
+)
+from firstfix.fields.map_fields import MapFields
+
+FIRST_POSES = 2000
+
+
+def kernels(fields: MapFields, rng: np.random.Generator) -> list[Kernel]:
+    """All of firstfix.fields, on a prepared map."""
+    return [
+        *_distances(fields.grid, fields.near),
+        _clearance(fields.grid),
+        _blocks(fields),
+        _pooled(fields),
+        _walked(fields.grid, rng),
+        _table(fields, rng),
+    ]
+
+
+def _distances(grid: OccupancyGrid, near: int) -> list[Kernel]:
+    occupied, cells = np.ascontiguousarray(grid.occupied), float(grid.occupied.size)
+    manhattan, squares = np.empty((2, *occupied.shape), np.uint16)
+    euclidean = np.empty(occupied.shape, np.float32)
+    column = euclidean.view(np.int32)
+    rounds = _rounds(occupied, near)
+    return [
+        Kernel(
+            function=distance_kernels.manhattan,
+            parts=(),
+            unit="cell",
+            units=cells,
+            call=lambda: distance_kernels.manhattan(occupied, manhattan),
+            working_set=3 * cells,
+            moved=7,  # walls read, distances written, read, written
+            operations=10,
+            roofs={
+                "memory": ((limits.copy(3 * cells), 7),),
+                "arithmetic": ((limits.operations("u16"), 6),),
+                "chain along a row": ((limits.chain(), 2),),
+            },
+        ),
+        Kernel(
+            function=distance_kernels.euclidean,
+            parts=(distance_kernels._lower_envelope, distance_kernels._squares_of_envelope),
+            unit="cell",
+            units=cells,
+            call=lambda: distance_kernels.euclidean(occupied, column, euclidean),
+            working_set=5 * cells,
+            moved=13,
+            operations=20,
+            roofs={
+                "memory": ((limits.copy(5 * cells), 13),),
+                "division and root": ((limits.calls("division"), 1), (limits.calls("sqrt"), 1)),
+            },
+        ),
+        Kernel(
+            function=distance_kernels.truncated,
+            parts=(distance_kernels._look_outward,),
+            unit="cell",
+            units=cells,
+            call=lambda: distance_kernels.truncated(occupied, near, squares),
+            working_set=3 * cells,
+            moved=7,
+            operations=8 + 3.25 * rounds,
+            roofs={
+                "memory": ((limits.copy(3 * cells), 7),),
+                "arithmetic": ((limits.operations("u16"), 8 + 3.25 * rounds),),
+            },
+        ),
+    ]
+
+
+def _rounds(occupied: NDArray[np.bool_], limit: int) -> float:
+    """How many columns to each side the truncated transform compares a cell with, on average."""
+    near = np.full(occupied.shape, limit, np.uint16)
+    for rows in (slice(None), slice(None, None, -1)):
+        best = np.full(occupied.shape[1], limit, np.uint16)
+        for wall, row in zip(occupied[rows], near[rows], strict=True):
+            best = np.where(wall, 0, np.minimum(best + 1, limit)).astype(np.uint16)
+            np.minimum(row, best, out=row)
+    total = sum(counts.rounds_outward(row, limit, distance_kernels._CHUNK) for row in near)
+    return float(total) / occupied.size
+
+
+def _clearance(grid: OccupancyGrid) -> Kernel:
+    occupied, cells = np.ascontiguousarray(grid.occupied), float(grid.occupied.size)
+    out = np.empty(occupied.shape, np.uint8)
+    return Kernel(
+        function=clearance._sweep,
+        parts=(clearance._nearest_of_three,),
+        unit="cell",
+        units=cells,
+        call=lambda: clearance._sweep(occupied, out),
+        working_set=2 * cells,
+        moved=4,
+        operations=9,
+        roofs={
+            "memory": ((limits.copy(2 * cells), 4),),
+            "arithmetic": ((limits.operations("u8"), 4),),
+            "chain along a row": ((limits.chain(), 2),),
+        },
+    )
+
+
+def _blocks(fields: MapFields) -> Kernel:
+    grid, stride = fields.grid, fields.positions.stride
+    free, occupied, cells = grid.seen_free, grid.occupied, float(grid.occupied.size)
+    return Kernel(
+        function=search_grid._free_blocks,
+        parts=(),
+        unit="cell",
+        units=cells,
+        call=lambda: search_grid._free_blocks(free, occupied, stride),
+        working_set=2 * cells,
+        moved=1 + 1 / stride**2,
+        operations=1,
+        roofs={
+            "memory": ((limits.read(2 * cells), 1 + 1 / stride**2),),
+            "arithmetic": ((limits.operations("u8"), 1),),
+        },
+    )
+
+
+def _pooled(fields: MapFields) -> Kernel:
+    squares, side = fields.squares, max(1, fields.positions.stride // 2)
+    metres = np.sqrt(np.arange(int(squares.max()) + 1)) * fields.grid.resolution
+    table = np.minimum(metres / endpoint_field.UNIT_M, endpoint_field.LIMIT).astype(np.float32)
+    cells = float(squares.size)
+    return Kernel(
+        function=endpoint_field._pool,
+        parts=(),
+        unit="cell",
+        units=cells,
+        call=lambda: endpoint_field._pool(squares, table, side),
+        working_set=2 * cells,
+        moved=2 + 1 / side**2,
+        operations=1 + 3 / side**2,
+        roofs={
+            "memory": ((limits.read(2 * cells), 2 + 1 / side**2),),
+            "looking up": ((limits.gather(table.nbytes), 1),),
+        },
+    )
+
+
+def _walked(grid: OccupancyGrid, rng: np.random.Generator) -> Kernel:
+    occupied = grid.occupied
+    y, x = rng.choice(np.argwhere(grid.seen_free)) + 0.3
+    headings, reach = np.linspace(-np.pi, np.pi, 2000), 12.0 / grid.resolution
+    return Kernel(
+        function=raycast.cast_rays,
+        parts=(raycast.cast_ray, raycast._towards),
+        unit="step",
+        units=counts.steps(occupied, x, y, headings, reach),
+        call=lambda: raycast.cast_rays(occupied, x, y, headings, reach),
+        working_set=(2 * reach) ** 2,
+        moved=1,
+        operations=8,
+        roofs={
+            "looking up": ((limits.gather((2 * reach) ** 2), 1),),
+            "arithmetic": ((limits.operations("f64"), 8),),
+        },
+    )
+
+
+LEAP_OPERATIONS = 14
+"""To both lines: 2 x (add, add, subtract, multiply); along: 2; floor, nearness: 3; a comparison."""
+
+
+def leap_roofs(working_set: float, leaps: float, *others: tuple[Any, float]) -> dict[str, Any]:
+    """What holds leaping rays back: a unit has so many leaps, and other things to do."""
+    return {
+        "looking up": ((limits.gather(working_set), leaps), *others),
+        "arithmetic": ((limits.operations("f64"), LEAP_OPERATIONS * leaps), *others),
+    }
+
+
+def _table(fields: MapFields, rng: np.random.Generator) -> Kernel:
+    count, n = min(FIRST_POSES, len(fields.positions)), range_table.DIRECTIONS
+    chosen = np.sort(rng.choice(len(fields.positions), count, replace=False))
+    x, y = fields.positions.centres(chosen)
+    headings = np.arange(n) * (2 * np.pi / n)
+    dx, dy = np.cos(headings), np.sin(headings)
+    per_cell = fields.grid.resolution / range_table.UNIT_M
+    table = np.empty((count, 2 * n), np.uint8)
+    each = np.repeat(x, n), np.repeat(y, n), np.tile(dx, count), np.tile(dy, count)
+    reach = np.full(count * n, range_table.FARTHEST / per_cell)
+    leaps = counts.leaps(fields.clearance, *each, reach)
+    working_set = float(fields.clearance.size)
+    return Kernel(
+        function=range_table._fill,
+        parts=(raycast.cast_ray_leaping, raycast._is_inside_cell),
+        unit="leap",
+        units=leaps,
+        call=lambda: range_table._fill(fields.clearance, x, y, dx, dy, per_cell, table),
+        working_set=working_set,
+        moved=1 + 2 * count * n / leaps,
+        operations=LEAP_OPERATIONS,
+        roofs=leap_roofs(working_set, 1.0),
+    )
