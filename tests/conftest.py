@@ -2,7 +2,11 @@
 
 import math
 import os
-from collections.abc import Iterator
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -101,6 +105,46 @@ def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("FIRSTFIX_CACHE_DIR", str(folder))
         yield folder
+
+
+@pytest.fixture
+def on_small_disk(tmp_path: Path) -> Callable[..., None]:
+    """Give a function that runs a program with a disk of 64 kB of its own, mounted at argv[1]."""
+    alone, disk = ["unshare", "--map-root-user", "--mount"], tmp_path / "disk"
+    mount = 'mount -t tmpfs -o size=64k tmpfs "$0"'
+    disk.mkdir()
+    if shutil.which("unshare") is None:
+        pytest.skip("no unshare in PATH")
+    try_it: list[Any] = [*alone, "sh", "-c", mount, disk]
+    tried = subprocess.run(try_it, capture_output=True, text=True, check=False)
+    if tried.returncode:
+        pytest.skip(f"nothing may be mounted here: {tried.stderr.strip()}")
+
+    def run(program: str) -> None:
+        then = f'{mount} && exec "$1" -c "$2" "$0"'
+        command: list[Any] = [*alone, "sh", "-c", then, disk, sys.executable, program]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        assert list(disk.iterdir()) == []  # nothing of it has reached the disk below
+
+    return run
+
+
+@pytest.fixture
+def full_after() -> Callable[[int], Any]:
+    """Give a context in which no file of this process can grow beyond so many bytes."""
+    resource = pytest.importorskip("resource")
+
+    @contextmanager
+    def full(size: int) -> Iterator[None]:
+        soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+    return full
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,5 @@
 """The file with the last pose, and how often it is written."""
 
-import errno
 from pathlib import Path
 
 import numpy as np
@@ -75,15 +74,54 @@ def test_what_cannot_be_written_or_removed_is_an_error_of_ours(tmp_path):
     assert PoseKeeper(Path("nul\0"), 1.0).withdraw() is None
 
 
-def test_a_full_disk_leaves_the_old_pose(file, monkeypatch):
+def test_a_full_disk_leaves_the_old_pose(file, full_after):
     keeper = PoseKeeper(file, 1.0)
     keeper.save(pose_at(1.0))
-
-    def full(*_):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(InputError, match="No space left on device"):
+    with full_after(100), pytest.raises(InputError, match="File too large"):
         keeper.save(pose_at(2.0))
     assert load_pose(file).stamp == 1.0
     assert [path.name for path in file.parent.iterdir()] == [file.name]
+    keeper.offer(pose_at(3.0))
+    assert load_pose(file).stamp == 3.0
+
+
+READ_ONLY = """
+import subprocess, sys
+from pathlib import Path
+import numpy as np
+from firstfix.adapters.pose_keeper import PoseKeeper
+from firstfix.core.errors import InputError
+from firstfix.core.se2 import SE2
+from firstfix.formats.saved_pose import SavedPose, load_pose
+
+disk = Path(sys.argv[1])
+keeper = PoseKeeper(disk / "pose.json", 1.0)
+at = lambda stamp: SavedPose(SE2(stamp, 0.0, 0.0), np.eye(3), stamp, SE2.identity(), "hall")
+keeper.save(at(1.0))
+subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
+for step in (lambda: keeper.save(at(2.0)), keeper.withdraw, lambda: keeper.offer(at(9.0))):
+    try:
+        step()
+    except InputError as error:
+        assert "Read-only file system" in str(error), error
+    else:
+        raise AssertionError("it was not refused")
+    assert load_pose(disk / "pose.json").stamp == 1.0
+subprocess.run(["mount", "-o", "remount,rw", disk], check=True)
+keeper.withdraw()
+assert list(disk.iterdir()) == []
+"""
+
+
+def test_a_disk_that_became_read_only_keeps_the_pose_and_says_so(on_small_disk):
+    on_small_disk(READ_ONLY)
+
+
+def test_a_folder_in_place_of_the_file_is_left_alone(tmp_path):
+    (tmp_path / "pose.json").mkdir()
+    (tmp_path / "pose.json" / "inside").touch()
+    keeper = PoseKeeper(tmp_path / "pose.json", 1.0)
+    for step in (lambda: keeper.save(pose_at(1.0)), keeper.withdraw):
+        with pytest.raises(InputError):
+            step()
+    assert [path.name for path in tmp_path.rglob("*")] == ["pose.json", "inside"]

@@ -2,6 +2,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 
@@ -117,6 +118,17 @@ def test_a_cut_file_is_built_again(tmp_path, share):
     assert path.stat().st_size == size
 
 
+def test_a_file_cut_at_any_byte_is_built_again(tmp_path):
+    builder = Builder({"a": np.arange(5, dtype=np.uint8), "b": np.array(0.5)})
+    load_or_build("key", builder, tmp_path)
+    content = only_file(tmp_path).read_bytes()
+    for size in range(len(content)):
+        (tmp_path / "key.fields").write_bytes(content[:size])
+        assert_equal_arrays(load_or_build("key", builder, tmp_path), builder.arrays)
+        assert builder.calls == 2 + size
+        assert only_file(tmp_path).read_bytes() == content
+
+
 @into_one_folder
 @given(st.binary(max_size=200))
 def test_a_foreign_file_is_built_again(tmp_path, content):
@@ -185,6 +197,52 @@ def test_a_disk_that_takes_nothing_costs_only_time(tmp_path, monkeypatch, where)
 def _open_full(descriptor, mode):
     os.close(descriptor)
     raise OSError(28, "No space left on device")
+
+
+def test_a_disk_that_is_full_after_any_byte_costs_only_time(tmp_path, full_after):
+    builder = Builder({"a": np.arange(100, dtype=np.uint8)})
+    load_or_build("whole", builder, tmp_path)
+    size = only_file(tmp_path).stat().st_size - len("whole") + len("key")
+    for most in range(0, size, 7):
+        with full_after(most):
+            assert_equal_arrays(load_or_build("key", builder, tmp_path), builder.arrays)
+        assert only_file(tmp_path).name == "whole.fields"  # no rest of a file is left
+    load_or_build("key", builder, tmp_path)
+    assert (tmp_path / "key.fields").exists()
+
+
+SMALL_DISK = """
+import subprocess, sys
+from pathlib import Path
+import numpy as np
+from firstfix.fields.cache import load_or_build
+
+disk, calls = Path(sys.argv[1]), []
+folder = disk / "cache"
+
+def load(key, size):
+    load_or_build(key, lambda: calls.append(key) or {"a": np.arange(size)}, folder)["a"][-1]
+    return sorted(path.name for path in folder.iterdir())
+
+assert load("large", 20_000) == [] and calls == ["large"]  # more than the disk has
+assert load("small", 2_000) == ["small.fields"]
+try:
+    (disk / "ballast").write_bytes(bytes(100_000))
+except OSError:
+    pass  # there is not a byte left
+assert load("other", 2_000) == ["small.fields"]
+subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
+assert load("other", 2_000) == ["small.fields"]
+assert load("small", 2_000) == ["small.fields"]  # read, though nobody can note that it was used
+assert calls == ["large", "small", "other", "other"]
+subprocess.run(["mount", "-o", "remount,rw", disk], check=True)
+(disk / "ballast").unlink()
+assert load("other", 2_000) == ["other.fields", "small.fields"]
+"""
+
+
+def test_a_disk_that_is_full_or_read_only_is_read_and_not_missed(on_small_disk):
+    on_small_disk(SMALL_DISK)
 
 
 def test_a_folder_that_cannot_be_is_done_without(tmp_path):
@@ -277,6 +335,59 @@ def test_processes_share_a_folder(tmp_path):
     ]
     assert [process.wait(60) for process in processes] == [0, 0, 0]
     assert not list(tmp_path.glob("*.partial"))
+
+
+KILLED = """
+import os, random, signal, sys, time
+from pathlib import Path
+import numpy as np
+from firstfix.fields.cache import load_or_build
+
+folder, rng, calls = Path(sys.argv[1]), random.Random(1), []
+build = lambda: calls.append(1) or {"a": np.arange(50_000)}
+for _ in range(60):
+    writer = os.fork()
+    while writer == 0:
+        (folder / "key.fields").unlink(missing_ok=True)
+        load_or_build("key", build, folder)
+    time.sleep(rng.uniform(0.0, 0.01))
+    os.kill(writer, signal.SIGKILL)
+    os.waitpid(writer, 0)
+    if (folder / "key.fields").exists():
+        known = len(calls)
+        assert (load_or_build("key", build, folder)["a"] == np.arange(50_000)).all()
+        assert len(calls) == known, "half a file"
+assert (load_or_build("key", build, folder)["a"] == np.arange(50_000)).all()
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes that are copies")
+def test_whoever_is_killed_while_writing_leaves_a_whole_file_or_none(tmp_path):
+    command = [sys.executable, "-c", KILLED, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr.decode()
+
+
+def test_a_file_that_somebody_writes_over_while_it_is_read_is_never_believed(tmp_path):
+    builder, is_over = Builder({"a": np.arange(50_000)}), threading.Event()
+    load_or_build("key", builder, tmp_path)
+    path = tmp_path / "key.fields"
+    content = path.read_bytes()
+
+    def scribble():
+        rng = np.random.default_rng(0)
+        while not is_over.is_set():
+            at = int(rng.integers(len(content) - 1000))
+            path.write_bytes(content[:at] + rng.bytes(1000) + content[at + 1000 :])
+            path.write_bytes(content)
+
+    scribbling = threading.Thread(target=scribble)
+    scribbling.start()
+    for _ in range(100):
+        assert_equal_arrays(load_or_build("key", builder, tmp_path), builder.arrays)
+    is_over.set()
+    scribbling.join()
+    assert builder.calls > 1
 
 
 def test_a_key_depends_on_everything():

@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -182,22 +184,35 @@ def test_a_file_cut_or_changed_anywhere_is_read_or_refused(tmp_path, data):
     assert "\n" not in refusal
 
 
+def test_a_file_cut_at_any_byte_is_refused(tmp_path):
+    path = tmp_path / "pose.json"
+    save_pose(path, pose())
+    content = path.read_bytes()
+    assert content.endswith(b"}\n")
+    for size in range(len(content) - 1):
+        path.write_bytes(content[:size])
+        with pytest.raises(InputError, match=r"pose\.json"):
+            load_pose(path)
+    path.write_bytes(content[:-1])  # all but the end of the line
+    assert_same(load_pose(path), pose())
+
+
 def test_there_is_none(tmp_path: Path):
     with pytest.raises(InputError, match="expected a saved pose, received no file"):
         load_pose(tmp_path / "pose.json")
 
 
-def test_an_error_while_writing_leaves_the_old_pose(tmp_path, monkeypatch):
+def test_a_disk_that_is_full_after_any_byte_leaves_the_old_pose(tmp_path, full_after):
     save_pose(tmp_path / "pose.json", pose())
-
-    def refuse(*_args):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("os.fsync", refuse)
-    with pytest.raises(InputError, match="No space left"):
-        save_pose(tmp_path / "pose.json", pose(stamp=0.0))
-    assert_same(load_pose(tmp_path / "pose.json"), pose())
-    assert [path.name for path in tmp_path.iterdir()] == ["pose.json"]
+    whole = (tmp_path / "pose.json").stat().st_size
+    for size in range(whole):
+        with full_after(size), pytest.raises(InputError, match="File too large"):
+            save_pose(tmp_path / "pose.json", pose(stamp=1700000001.123))
+        assert_same(load_pose(tmp_path / "pose.json"), pose())
+        assert [path.name for path in tmp_path.iterdir()] == ["pose.json"]
+    with full_after(whole):
+        save_pose(tmp_path / "pose.json", pose(stamp=1700000001.123))
+    assert load_pose(tmp_path / "pose.json").stamp == 1700000001.123
 
 
 def test_two_robots_that_share_a_file_by_mistake_leave_a_whole_pose(tmp_path):
@@ -215,6 +230,34 @@ def test_two_robots_that_share_a_file_by_mistake_leave_a_whole_pose(tmp_path):
     while any(writer.is_alive() for writer in writers):
         assert load_pose(path).map_key in {saved.map_key for saved in poses}
     assert [path.name for path in tmp_path.iterdir()] == ["pose.json"]
+
+
+WRITER = """
+import sys
+import numpy as np
+from firstfix.core.se2 import SE2
+from firstfix.formats.saved_pose import SavedPose, load_pose, save_pose
+
+path, letter = sys.argv[1:]
+for i in range(200):
+    here = SE2(float(ord(letter)), 0.0, 0.0)
+    save_pose(path, SavedPose(here, np.eye(3), float(i), here, letter * 200))
+    seen = load_pose(path)
+    assert seen.map_key == chr(int(seen.T_map_base.x)) * 200, "two poses in one"
+"""
+
+
+def test_two_processes_that_share_a_file_leave_a_whole_pose(tmp_path):
+    path = tmp_path / "pose.json"
+    save_pose(path, pose(map_key="a" * 200))
+    writers = [
+        subprocess.Popen([sys.executable, "-c", WRITER, path, letter], stderr=subprocess.PIPE)
+        for letter in "ab"
+    ]
+    while any(writer.poll() is None for writer in writers):
+        assert load_pose(path).map_key in {"a" * 200, "b" * 200}
+    assert [writer.communicate()[1] for writer in writers] == [b"", b""]
+    assert [found.name for found in tmp_path.iterdir()] == ["pose.json"]
 
 
 def test_a_map_is_known_again_by_its_cells_and_where_they_lie():

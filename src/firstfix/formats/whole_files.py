@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
+import time
 import uuid
 from collections.abc import Iterable
 from pathlib import Path
 
 from firstfix.core.errors import InputError
 from firstfix.formats.map_files import is_file, show
+
+_DRAFT = re.compile(r"\.[0-9a-f]{32}\.draft")
+# Nobody writes for so long, s: what is older was left by somebody who was killed while writing.
+_ABANDONED_AFTER_S = 3600.0
 
 
 def read_bytes(path: Path, *, what: str, limit: int) -> bytes:
@@ -121,12 +127,22 @@ def write_whole(target: Path, pieces: Iterable[bytes | memoryview]) -> None:
         draft.replace(target)
     finally:
         draft.unlink(missing_ok=True)
+    _remove_abandoned(target.parent)
     with contextlib.suppress(OSError):  # not every file system can; the content is safe already
         folder = os.open(target.parent, os.O_RDONLY)
         try:
             os.fsync(folder)
         finally:
             os.close(folder)
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Remove drafts that nobody will finish; a robot that is switched off often leaves many."""
+    with contextlib.suppress(OSError):
+        for path in folder.iterdir():
+            is_draft = _DRAFT.fullmatch(path.name) is not None
+            if is_draft and time.time() - path.lstat().st_mtime > _ABANDONED_AFTER_S:
+                path.unlink(missing_ok=True)
 
 
 def remove_file(path: Path) -> None:
