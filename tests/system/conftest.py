@@ -69,13 +69,21 @@ class Robot:
     def tick(self, moved: SE2 | None = None, damage: Damage | None = None) -> list[Output]:
         """Let 0.1 s pass."""
         moved = moved or SE2.identity()
-        self._ticks += 1
-        self.stamp = 100.0 + self._ticks / 10
-        self.pose = self.pose @ moved
-        self.T_odom_base = self.T_odom_base @ moved
+        self.skip(moved)
         scan = self.scan()
         odometry = self.tell(Odometry(self.stamp, self.T_odom_base))
         return odometry + self.tell(damage(scan) if damage else scan)
+
+    def skip(self, moved: SE2) -> None:
+        """Let 0.1 s pass of which nobody hears."""
+        self.pass_time(0.1)
+        self.pose = self.pose @ moved
+        self.T_odom_base = self.T_odom_base @ moved
+
+    def pass_time(self, seconds: float) -> None:
+        """Let time pass, in tenths of a second."""
+        self._ticks += round(10.0 * seconds)
+        self.stamp = 100.0 + self._ticks / 10
 
     def ticks(self, n: int, moved: SE2 | None = None, damage: Damage | None = None) -> list[Output]:
         """Let n times 0.1 s pass."""

@@ -84,6 +84,52 @@ def test_odometry_that_begins_anew_changes_no_pose(in_hall, restart, of, is_at):
     assert is_at(tracked[-1].T_map_odom @ in_hall.T_odom_base, expected @ in_hall.T_odom_base)
 
 
+@pytest.mark.parametrize("silence_s", [0.5, 3.0, 60.0])
+def test_a_base_that_was_silent_while_it_was_restarted_changes_no_pose(
+    in_hall, silence_s, of, is_at
+):
+    """However far the wheels had counted, the robot has not driven there and back meanwhile."""
+    in_hall.ticks(10, A_STEP)
+    in_hall.T_odom_base = SE2.identity()
+    in_hall.pass_time(silence_s)
+    for moved in (SE2.identity(), *[A_STEP] * 9):
+        (tracked,) = of(TrackedPose, in_hall.tick(moved))
+        assert is_at(tracked.T_map_base, in_hall.pose)
+
+
+def back(step: SE2, times: int) -> SE2:
+    pose = SE2.identity()
+    for _ in range(times):
+        pose = pose @ step.inverse()
+    return pose
+
+
+@pytest.mark.parametrize("restart", [SE2(0.4, 0.2, 0.0), SE2(-1.0, 6.0, -2.0)])
+def test_a_base_that_drove_on_before_it_was_heard_again_publishes_no_wrong_pose(
+    in_hall, restart, poses, of
+):
+    in_hall.ticks(10, A_STEP)
+    in_hall.T_odom_base = restart  # no longer at its start: nothing tells of the new frame
+    in_hall.pass_time(5.0)
+    outputs = in_hall.ticks(30, A_STEP)
+    told = poses(outputs)
+    assert len(told) > 20
+    for pose in told:
+        ticks_since = round((in_hall.stamp - pose.stamp) / 0.1)
+        true = in_hall.pose @ back(A_STEP, ticks_since)
+        assert pose.T_map_base.distance_to(true) < 0.3
+    assert "odometry has leapt" in of(Status, outputs)[0].reason
+
+
+def test_a_robot_that_drove_on_in_silence_goes_on(in_hall, kinds, is_at):
+    for _ in range(12):
+        in_hall.skip(A_STEP)
+    for _ in range(3):
+        outputs = in_hall.tick(A_STEP)
+        assert kinds(outputs) == [TrackedPose, Status]
+        assert is_at(outputs[0].T_map_base, in_hall.pose)
+
+
 def test_a_clock_that_goes_back_changes_no_pose(in_hall, kinds, is_at):
     in_hall.ticks(5, A_STEP)
     for k in range(5):

@@ -50,7 +50,7 @@ def test_an_empty_one_knows_nothing() -> None:
 def test_it_interpolates_as_a_trajectory_does(
     begin: float, steps: list[tuple[float, float, float, float]], asked: list[float]
 ) -> None:
-    stamps, poses = [begin], [SE2(0.0, 0.0, 3.0)]
+    stamps, poses = [begin], [SE2(99.0, 0.0, 3.0)]  # far from zero, where it would begin anew
     for seconds, vx, vy, w in steps:
         last = poses[-1]
         stamps.append(stamps[-1] + seconds)
@@ -153,6 +153,42 @@ def test_what_a_robot_can_do_is_no_jump(seconds: float, moved: SE2) -> None:
     buffer = filled((99.0, begin), (100.0, begin))
     assert not buffer.add(Odometry(100.0 + seconds, begin @ moved))
     assert buffer.at(99.0) == begin
+
+
+@pytest.mark.parametrize("seconds", [0.1, 3.0, 3600.0])
+@pytest.mark.parametrize("start", [SE2.identity(), SE2(0.03, -0.03, 2.0)])
+def test_odometry_restarted_at_zero_is_a_jump_however_long_it_was_silent(
+    seconds: float, start: SE2
+) -> None:
+    buffer = filled((100.0, SE2(0.4, 0.0, 1.0)))
+    assert buffer.add(Odometry(100.0 + seconds, start))
+
+
+def test_a_robot_that_drives_by_where_it_started_has_not_begun_anew() -> None:
+    filled(*((0.1 * i, SE2(0.25 * i - 3.0, 0.0, 0.0)) for i in range(25)))
+    filled(*((0.5 * i, SE2(0.0, 0.0, i - 3.0)) for i in range(7)))
+
+
+@pytest.mark.parametrize(
+    ("moved", "seconds", "is_leap"),
+    [
+        (SE2(0.49, 0.0, 0.5), 10.0, False),
+        (SE2(0.0, 0.51, 0.0), 10.0, True),
+        (SE2(0.0, 0.0, -0.53), 10.0, True),
+        (SE2(0.0, 0.51, 0.0), 0.3001, True),
+        (SE2(0.0, 0.51, 0.0), 0.2999, False),  # a fast robot, heard as often as before
+    ],
+)
+def test_a_long_step_after_a_silence_is_a_leap(
+    moved: SE2, seconds: float, *, is_leap: bool
+) -> None:
+    begin = SE2(3.0, 4.0, 2.0)
+    one, two = Odometry(99.875, begin), Odometry(100.0, begin)
+    buffer = OdometryBuffer()
+    for message in (one, two):
+        assert not buffer.leaps(message)
+        buffer.add(message)
+    assert buffer.leaps(Odometry(100.0 + seconds * 1.25, begin @ moved)) is is_leap
 
 
 def test_odometry_restarted_at_zero_is_a_jump() -> None:

@@ -70,6 +70,7 @@ class Localizer:
         self._cache_dir = cache_dir
         self._rng = np.random.default_rng(self.config.amcl.seed)
         self._odometry = OdometryBuffer()
+        self._has_leapt = False  # and no scan has fitted since
         self._waiting: deque[LaserScan] = deque(maxlen=_MOST_WAITING)
         self._lifted: set[SignalKind] = set()
         self._stands_since = -math.inf
@@ -145,7 +146,10 @@ class Localizer:
 
     def _take_odometry(self, given: Odometry) -> list[Output]:
         before = self._odometry.last
-        if not self._odometry.add(given):
+        has_leapt = self._odometry.leaps(given)
+        has_jumped = self._odometry.add(given)
+        self._has_leapt |= has_leapt or has_jumped
+        if not has_jumped:
             return self._take_waiting_scan()
         self._waiting.clear()  # of the clock or the frame before
         self._stands_since = min(self._stands_since, given.stamp)
@@ -274,6 +278,10 @@ class Localizer:
             reason = f"only {evidence.explained:.0%} of the beams fit here, for too long: searching"
             return [self._forget(scan.stamp, Event.LOST, reason, evidence)]
         said = f"{evidence.explained:.0%} of the beams fit"
+        self._has_leapt &= look.finding is not Finding.FITS
+        if self._has_leapt:
+            reason = f"odometry has leapt, and only {said} since: waiting for more"
+            return [Status(scan.stamp, self.state, reason, evidence)]
         reason = {
             Finding.FITS: said,
             Finding.SILENT: "the sensor sees too little to tell: going on by odometry",
@@ -307,6 +315,7 @@ class Localizer:
         """Begin a track at a place."""
         covariance = place.covariance + _BEGIN_COVARIANCE
         n = self.config.amcl.max_particles
+        self._has_leapt = False
         self._track = Track(start(around_pose(place.pose, covariance, n, self._rng)), T_odom_base)
         self._watch = Watch(self._locator, self.config.watch)
         T_map_odom = place.pose @ T_odom_base.inverse()

@@ -18,6 +18,13 @@ _FASTEST_RAD_S = 15.0
 _JUMP_M = 0.3
 _JUMP_RAD = math.radians(30.0)
 
+# Odometry this close to zero, m, has just begun to count, unless the robot came from nearby.
+_START_M = 0.05
+
+# After a silence of several messages, a step so long is more than a pose may be wrong by.
+_LEAP_M = 0.5
+_SILENCE = 3.0
+
 
 class OdometryBuffer:
     """Odometry in the order of its stamps, up to 2000 messages."""
@@ -52,6 +59,31 @@ class OdometryBuffer:
         self._kept.append(odometry)
         return jumped
 
+    def leaps(self, odometry: Odometry) -> bool:
+        """Tell whether a message, not yet added, needs a scan that confirms it.
+
+        After a silence nothing tells a robot that drove on from one whose base was restarted, and
+        counts from elsewhere.
+
+        Parameters
+        ----------
+        odometry : Odometry
+            The next message.
+
+        Returns
+        -------
+        bool
+            True if it is far from the last one, and messages are missing in between.
+        """
+        if len(self._kept) < 2:
+            return False
+        before, last = self._kept[-2], self._kept[-1]
+        usual_s = last.stamp - before.stamp
+        way = last.T_odom_base.distance_to(odometry.T_odom_base)
+        turn = angle_error(last.T_odom_base.yaw, odometry.T_odom_base.yaw)
+        is_after_silence = odometry.stamp - last.stamp > _SILENCE * usual_s
+        return is_after_silence and (way > _LEAP_M or turn > _JUMP_RAD)
+
     def at(self, stamp: float) -> SE2 | None:
         """Interpolate ``T_odom_base`` at a time; None if it is not known there, or not yet."""
         i = bisect_left(self._kept, stamp, key=lambda odometry: odometry.stamp)
@@ -77,5 +109,8 @@ def _has_jumped(last: Odometry, new: Odometry) -> bool:
     if passed < 0.0:
         return True
     way = last.T_odom_base.distance_to(new.T_odom_base)
+    # However long it was silent: a base that was restarted is at zero, and stands where it stood.
+    if way > _JUMP_M and new.T_odom_base.distance_to(SE2.identity()) <= _START_M:
+        return True
     turn = angle_error(last.T_odom_base.yaw, new.T_odom_base.yaw)
     return way > _JUMP_M + _FASTEST_M_S * passed or turn > _JUMP_RAD + _FASTEST_RAD_S * passed
