@@ -100,6 +100,7 @@ def cache(tmp_path_factory):
     return tmp_path_factory.mktemp("maps")
 
 
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
 @given(st.lists(HEARD, max_size=12), st.lists(HEARD, max_size=12))
 def test_whatever_is_heard_only_errors_of_ours_come_of_it(ros2, hall_plan, cache, before, after):
@@ -118,6 +119,7 @@ def test_whatever_is_heard_only_errors_of_ours_come_of_it(ros2, hall_plan, cache
     assert pair.localizer.state in State
 
 
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40)
 @given(st.lists(NUISANCES, max_size=12))
 def test_after_any_nonsense_a_robot_that_reports_well_is_found(ros2, hall_plan, cache, messages):

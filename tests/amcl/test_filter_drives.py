@@ -65,6 +65,7 @@ def squared_error(truth: SE2, state: FilterState) -> float:
     return float(off @ np.linalg.solve(state.estimate.covariance, off))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alpha", [0.2, 0.05])
 def test_the_truth_is_within_three_sigma_of_the_estimate(room, alpha, fixed, drive):
     alphas = {f"alpha{k}": alpha for k in range(1, 5)}

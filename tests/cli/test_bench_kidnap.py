@@ -37,6 +37,7 @@ def test_every_disturbance_has_time_after_it() -> None:
                 assert sum(getattr(p, "seconds", 0.0) for p in calm) >= kidnap_scripts.AFTER_S
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("in_this_process")
 def test_a_world_is_played_and_told(cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kidnap_scripts, "_NOTHING_S", 20.0)
@@ -79,6 +80,7 @@ def test_what_happens_to_a_robot_reaches_the_judgement(
     assert all(instant.cpu_s >= 0.0 and instant.truth is not None for instant in instants)
 
 
+@pytest.mark.slow
 def test_a_spliced_drive_is_a_story_of_unsignalled_kidnaps(hall_plan: OccupancyGrid) -> None:
     recording = record(run(Scenario([DriveTo(seconds=15.0), DriveTo()] * 4), hall_plan, 2))
     thin = Recording(recording.scans[::4], recording.odometry, _rows(recording.truth))

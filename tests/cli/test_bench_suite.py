@@ -51,6 +51,7 @@ def test_the_papers_experiments_are_run_and_told(cli, tmp_path: Path) -> None:
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"report.md", "house.png"}
 
 
+@pytest.mark.slow
 def test_steps_are_left_out_over_cases(cli, cases: Path, tmp_path: Path) -> None:
     arguments = [cases / "unique", "--limit", 2, "--json", "a.json", "--report", "out"]
     ended = cli("bench", "--suite", "ablation", *arguments)

@@ -40,6 +40,7 @@ def test_version(cli) -> None:
     assert cli("--version").out == f"firstfix {__version__}\n"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("in_this_process")
 def test_bench_compares_with_the_truth_and_writes_it_down(cli, cases: Path, tmp_path: Path) -> None:
     arguments = ["--foreign", "--jobs", 2, "--json", "out/bench.json", "--report", "out/report"]
@@ -139,6 +140,7 @@ def test_map_check_of_a_map_with_nothing_in_it(cli, tmp_path: Path, grey: int, w
     assert word in told
 
 
+@pytest.mark.slow
 def test_map_show_marks_what_looks_alike(cli, alike: Files, tmp_path: Path) -> None:
     for name, options in (("plain.png", []), ("marked.png", ["--alike", "--samples", 4])):
         assert cli("map", "show", alike[0], "--plot", name, *options).status == 0
@@ -159,6 +161,7 @@ def short_story(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("firstfix.cli.story.SCRIPT", acts)
 
 
+@pytest.mark.slow
 def test_the_demo_tells_a_story_that_ends_well(cli, tmp_path: Path) -> None:
     ended = cli("demo", "--world", "house", "--headless", "--seed", 3)
     assert (ended.status, ended.err) == (0, ""), ended
@@ -188,6 +191,7 @@ def test_the_demo_without_matplotlib_tells_its_story_all_the_same(
     assert not (tmp_path / "firstfix-demo.png").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("short_story")
 def test_the_demo_takes_a_map_of_ones_own(cli, unique: Files) -> None:
     assert cli("demo", "--headless", "--world", unique[0], "--plot", "own.svg").status in (0, 1)

@@ -104,6 +104,7 @@ def test_both_methods_find_it(cli, unique: Files, method: str) -> None:
     assert abs(yaw - 0.5) < math.radians(10.0)
 
 
+@pytest.mark.slow
 def test_the_picture_is_drawn_where_it_was_asked_for(cli, unique: Files, tmp_path: Path) -> None:
     ended = cli("locate", *unique, "--plot", "out/place.png")
     assert ended.status == 0

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 Files = tuple[Path, Path]
 
 
@@ -38,6 +40,7 @@ def test_help_loads_nothing_heavy() -> None:
     assert not {"numba", "matplotlib", "rosbags", "PIL"} & set(ended.stdout.split())
 
 
+@pytest.mark.slow
 def test_a_reader_that_leaves_early_is_no_error(unique: Files) -> None:
     process = subprocess.Popen(
         command("locate", *unique, "--all", "--json"),

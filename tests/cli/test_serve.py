@@ -61,6 +61,7 @@ def wait_for(url: str, state: str) -> dict[str, Any]:
     return told
 
 
+@pytest.mark.slow
 def test_a_simulated_robot_is_served_until_ctrl_c() -> None:
     with running("serve", "house", "--port", 0) as (process, url):
         told = wait_for(url, "LOCALIZED")
@@ -84,6 +85,7 @@ def test_the_robot_of_the_demo_sleeps_until_somebody_looks() -> None:
         process.communicate(timeout=PATIENCE_S)
 
 
+@pytest.mark.slow
 def test_a_map_of_ones_own_is_served_read_only_with_a_token(unique: Files) -> None:
     arguments = ("serve", unique[0], "--port", 0, "--read-only")
     with running(*arguments, FIRSTFIX_TOKEN=TOKEN) as (process, url):

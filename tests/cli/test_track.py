@@ -118,6 +118,7 @@ def test_the_trajectory_has_a_pose_for_every_scan(
     np.testing.assert_allclose(trajectory.poses[-1], document["end"]["pose"], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_picture_is_drawn_where_it_was_asked_for(
     cli, files: tuple[Path, Path], tmp_path: Path
 ) -> None:
@@ -262,6 +263,7 @@ def test_wrong_input_leaves_earlier_results_alone(
     assert not (tmp_path / "new.json").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.shared
 @pytest.mark.parametrize(
     ("case", "log", "start"),

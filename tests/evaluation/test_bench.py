@@ -64,6 +64,7 @@ def test_foreign_maps_are_those_of_the_next_other_building(case: Case) -> None:
     assert foreign_tasks(cases[:2], [Method.FAST], 0) == []
 
 
+@pytest.mark.slow
 def test_a_case_that_cannot_be_loaded_ends_the_benchmark() -> None:
     unloadable = Case(
         "broken",

@@ -120,6 +120,7 @@ def test_incidents_tell_what_was_said_around_them() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_report_has_tables_and_the_curve(runs: list[KidnapRun], tmp_path: Path) -> None:
     document = kidnap_document(runs, [("intel", "no odometry")])
     page = write_kidnap_report(runs, document, tmp_path / "report")

@@ -130,10 +130,12 @@ def shown(hall: OccupancyGrid, cross: LaserScan, middle: SE2) -> Shown:
     return Shown("hall", 4, hall, (cross, cross), attempts)
 
 
+@pytest.mark.slow
 def test_a_drive_becomes_a_picture(tmp_path: Path, shown: Shown) -> None:
     assert draw_starts(shown, tmp_path / "hall.png").stat().st_size > 5000
 
 
+@pytest.mark.slow
 def test_the_report_has_tables_ways_and_pictures(
     tmp_path: Path, shown: Shown, document: dict
 ) -> None:

@@ -99,6 +99,7 @@ def test_beams_are_sorted_by_how_they_agree(hall: OccupancyGrid, middle: SE2) ->
     assert fit_of_hits(grid, scan, middle).tolist() == expected
 
 
+@pytest.mark.slow
 def test_a_report_has_a_table_and_two_plots(tmp_path: Path) -> None:
     hit = Outcome(0, Verdict.UNIQUE, PoseError(0.02, 0.001), 1, 0.03, 0.04, 0.99)
     lost = Outcome(2, Verdict.NO_MATCH, NO_POSE, None, 0.01, 0.02, 0.0)

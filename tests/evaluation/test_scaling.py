@@ -53,6 +53,7 @@ def test_threads_give_the_answers_of_one(hall_plan: OccupancyGrid) -> None:
         assert (a.verdict, a.best.pose, a.best.score) == (b.verdict, b.best.pose, b.best.score)
 
 
+@pytest.mark.slow
 def test_the_report_has_all_tables_and_a_plot(hall_plan: OccupancyGrid, tmp_path: Path) -> None:
     seen = sightings(hall_plan, 90)
     costs = CostTask(hall_plan, Method.PAPER, (seen,))()

@@ -24,6 +24,7 @@ def story() -> list[Scene]:
     return [scene(i, act, published=i % 4 != 3) for act in range(3) for i in range(12)]
 
 
+@pytest.mark.slow
 def test_a_story_is_drawn(tmp_path: Path) -> None:
     path = draw_story(small_room(), story(), tmp_path / "story.png")
     assert path == tmp_path / "story.png"

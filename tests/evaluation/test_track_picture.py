@@ -24,6 +24,7 @@ def tracked(hall_plan: OccupancyGrid, driven: Recording) -> list[TrackedScan]:
     return [*follow_drive(drive, make_tracker(hall_plan, config), config, TRUE_START, rng)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["track.png", "new/track.svg"])
 def test_a_track_becomes_a_picture(
     tmp_path: Path, hall_plan: OccupancyGrid, tracked: list[TrackedScan], name: str

@@ -63,6 +63,7 @@ def test_tags_construct_nothing(read, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["map.yaml"]
 
 
+@pytest.mark.slow
 def test_the_longest_admitted_file_takes_little_time(read):
     started = time.process_time()
     read(b"a: {" + b"a," * 16_000 + b"}")

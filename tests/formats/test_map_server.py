@@ -358,6 +358,7 @@ def test_any_bytes_as_image(folder, magic, data):
 # --- maps from the wild -------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.shared
 def test_every_map_of_the_wild_loads_and_checks(shared):
     paths = [p for p in sorted(shared.glob("maps/*.yaml")) if "huge" not in p.name]
@@ -380,6 +381,7 @@ def test_the_map_of_every_case_loads(shared):
         assert load_map(path).occupied.any()
 
 
+@pytest.mark.slow
 @pytest.mark.shared
 def test_a_map_of_45_million_cells_loads_by_default(shared):
     grid = load_map(shared / "maps" / "range_libc__huge_map.yaml")

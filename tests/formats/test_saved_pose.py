@@ -247,6 +247,7 @@ for i in range(200):
 """
 
 
+@pytest.mark.slow
 def test_two_processes_that_share_a_file_leave_a_whole_pose(tmp_path):
     path = tmp_path / "pose.json"
     save_pose(path, pose(map_key="a" * 200))

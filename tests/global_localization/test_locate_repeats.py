@@ -18,6 +18,7 @@ from firstfix.sim.world import random_free_pose
 LIDAR = Lidar(beams=360, sigma_m=0.01)
 
 
+@pytest.mark.slow
 def test_twice_and_from_many_threads_it_is_the_same(office_locator, told):
     grid = office_locator.fields.grid
     rng = np.random.default_rng(7)

@@ -191,6 +191,7 @@ def tiles() -> MapFields:
     return fields
 
 
+@pytest.mark.slow
 def test_many_tiles(tiles):
     beams = random_beams(5, 9, 0.7, 10.0)
     candidates, report = search(beams, tiles, 300, math.inf)

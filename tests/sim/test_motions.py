@@ -51,6 +51,7 @@ def test_a_pause_is_silent_and_takes_its_time(flat: OccupancyGrid) -> None:
     assert story[-1].scan is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WORLDS)
 def test_in_every_world_a_wandering_robot_gets_about_and_never_stands_in_a_wall(name: str) -> None:
     floor = Floor(WORLDS[name]())

@@ -129,6 +129,7 @@ def test_who_is_elsewhere_does_not_win_where_the_places_were(
     raise AssertionError("neither lost nor found")
 
 
+@pytest.mark.slow
 def test_in_a_foreign_building_nothing_wins(hall_plan, office_locator):
     """A hall on the map of the office: about two thirds of the beams fit some room."""
     lidar = Lidar(beams=180)

@@ -54,6 +54,7 @@ def test_a_scan_that_says_nothing_is_no_proof_and_the_hint_waits(
     assert is_at(poses(robot.tick())[0].T_map_base, IN_ROOM_1)
 
 
+@pytest.mark.slow
 def test_in_a_building_without_equals_a_wrong_hint_never_wins(
     robot_in, office, office_poses, poses, is_at
 ):

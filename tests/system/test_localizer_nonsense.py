@@ -21,6 +21,7 @@ A_STEP, A_TURN = SE2(0.05, 0.0, 0.05), SE2(0.0, 0.0, 0.1)
 # ---- people, and sensors that see nothing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("together", [True, False])
 def test_people_are_no_kidnapping(
     robot_in, office, with_ranges, together, kinds, is_at, office_poses

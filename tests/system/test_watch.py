@@ -125,6 +125,7 @@ def test_contradiction_must_last(watch, absurd):
     assert any(finding is Finding.CONTRADICTED for _, finding in findings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off", [SE2.identity(), SE2(0.2, 0.0, 0.0)])
 def test_one_good_scan_ends_a_contradiction(watch, absurd, seen, off):
     """Also where the track is a little off, and would be put right by a second one."""
@@ -135,6 +136,7 @@ def test_one_good_scan_ends_a_contradiction(watch, absurd, seen, off):
         assert finding is (Finding.FITS if good else Finding.DOUBTFUL)
 
 
+@pytest.mark.slow
 def test_the_whole_map_is_not_searched_for_every_scan(watch, absurd, searches):
     for k in range(100):
         watch.look(absurd(0.02 * k), ODOM, HERE)

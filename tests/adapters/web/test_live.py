@@ -174,6 +174,7 @@ def test_a_message_that_is_too_long_ends_the_connection(site: Site):
         assert ended.value.rcvd.code == 1009
 
 
+@pytest.mark.slow
 def test_there_is_an_end_to_viewers(site: Site):
     with ExitStack() as stack:
         for _ in range(MOST_VIEWERS):
@@ -234,6 +235,7 @@ def reached(site: Site) -> socket.socket:
     return socket.create_connection(("127.0.0.1", urlsplit(site.url).port))
 
 
+@pytest.mark.slow
 def test_a_viewer_that_does_not_read_keeps_nobody_waiting():
     """Frames for it are dropped; what it gets when it reads again is new."""
     office = drive("office")
