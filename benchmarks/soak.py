@@ -1,0 +1,489 @@
+"""Let the whole system live for half an hour while everything that can happen to it happens.
+
+A real roscore; a simulated robot in a process of its own, which drives about in a built-in
+building; the node with its live page, as users start it; a viewer of the page; and a witness, who
+writes down what the node publishes. A seeded script lets people come, scans and odometry be
+dropped, held back and late, clocks jump, the robot be kidnapped, the node be frozen; and it kills
+and restarts each of the processes, or all at once. In the first half the node is not killed, so
+that its memory can be seen to grow. Afterwards each pose that was published is compared with the
+truth, see `soak_judged`.
+
+    python benchmarks/soak.py [--minutes 30] [--seed 1] [--world office] [--mode full]
+        [--report benchmarks/reports/DATE/soak]
+
+Needs the Python that has rospy, roscore in the PATH, and the package websockets.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import heapq
+import itertools
+import json
+import os
+import signal
+import socket
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "robots"))
+
+from ros1_lab import Master, Program, why_missing
+from soak_judged import judge
+from soak_report import write_report
+
+from firstfix.evaluation.machine import this_machine
+from firstfix.formats.map_server import save_map
+from firstfix.sim.world import WORLDS
+
+HERE = Path(__file__).parent
+SENSORS = ["scan", "/tf"]
+HOUR_S = 3600.0
+# Kernels may have to be compiled first.
+PATIENCE_S = 300.0
+# From the end of a fault to the next: most have a calm time after them, some have none.
+CALM_S, CALM_AFTER_A_KILL_S, HASTE_S, HASTE = (6.0, 10.0), (10.0, 15.0), 0.3, 0.15
+# A node that is not killed for so much of the time has a memory to look at.
+FIRST_LIFE = 0.5
+_TICK_S = 0.05
+
+
+class Part(Program):
+    """A program of the system, with figures that end with it."""
+
+    @property
+    def pid(self) -> int:
+        """Its process."""
+        return self._process.pid
+
+    def figures(self) -> dict[str, float] | None:
+        """Return memory (MB), processor time (s), threads and open files; None once it is dead."""
+        try:
+            return {
+                "rss_mb": self.memory_mb,
+                "cpu_s": self.cpu_s,
+                "threads": len([*Path(f"/proc/{self.pid}/task").iterdir()]),
+                "files": len([*Path(f"/proc/{self.pid}/fd").iterdir()]),
+            }
+        except (OSError, IndexError):
+            return None
+
+
+class Core(Master):
+    """A roscore that can be killed with all its parts, and comes back at the same address."""
+
+    def kill(self) -> None:
+        """End it as a power cut does."""
+        if self._program is None:
+            return
+        own = self._program._process.pid
+        for pid in [own, *children(own)]:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        self._program.wait()
+        self._program.end()
+        self._program = None
+
+
+def children(pid: int) -> list[int]:
+    """Return the processes below one."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            after_name = path.read_text(encoding="utf-8", errors="replace").rpartition(")")[2]
+            if int(after_name.split()[1]) == pid:
+                child = int(path.parent.name)
+                found += [child, *children(child)]
+    return found
+
+
+class System:
+    """All processes, and how to start and kill each."""
+
+    def __init__(self, folder: Path, world: str, mode: str, seed: int) -> None:
+        self._folder, self._world, self._mode = folder, world, mode
+        self.core = Core(folder)
+        self.core.environment["FIRSTFIX_CACHE_DIR"] = str(folder / "cache")
+        self._map = save_map(WORLDS[world](), folder / f"{world}.yaml")
+        with socket.create_server(("127.0.0.1", 0)) as probe:
+            self._port = probe.getsockname()[1]
+        self.truth, self.said, self.seen = (
+            folder / f"{name}.jsonl" for name in ("truth", "said", "seen")
+        )
+        self.saved_pose = folder / "pose.json"
+        self._seeds = itertools.count(seed)
+        self._numbers = itertools.count()
+        self.parts: dict[str, Part] = {}
+
+    def start_node(self) -> None:
+        """Start the node with its page, as `docs/live.md` says."""
+        arguments = [f"_mode:={self._mode}", f"_saved_pose_file:={self.saved_pose}"]
+        command = ["-m", "firstfix", "serve", self._map, "--robot", "ros1", "--port", self._port]
+        self._start("node", *command, "--", *arguments)
+
+    def start_robot(self, *start: float) -> None:
+        """Start the robot, at a place (x, y, yaw) or anywhere."""
+        command = [HERE / "soak_robot.py", self._world, next(self._seeds), self.truth]
+        self._start("robot", *command, *(["--start", *start] if start else []))
+
+    def start_witness(self) -> None:
+        """Start who listens to the node."""
+        self._start("witness", HERE / "soak_witness.py", "ros", self.said)
+
+    def start_viewer(self) -> None:
+        """Start who looks at the page."""
+        url = f"ws://127.0.0.1:{self._port}/v1/live"
+        self._start("viewer", HERE / "soak_witness.py", "page", self.seen, url)
+
+    def tell(self, **order: Any) -> None:
+        """Tell the robot what happens to it; a dead one does not hear it."""
+        if "robot" in self.parts:
+            with contextlib.suppress(OSError):
+                self.parts["robot"].tell(**order)
+
+    def kill(self, name: str) -> None:
+        """Kill a process that needs no time for it."""
+        part = self.parts.pop(name)
+        with contextlib.suppress(ProcessLookupError):
+            part.send(signal.SIGKILL)
+        part.wait()
+        part.end()
+
+    def where_the_robot_died(self) -> list[float]:
+        """Return the last true pose."""
+        last = [0.0, 0.0, 0.0]
+        for line in _whole_lines(self.truth):
+            last = line.get("pose", last)
+        return last
+
+    def end(self) -> None:
+        """End all, the node first and kindly."""
+        for name in list(self.parts):
+            self.parts.pop(name).end()
+        self.core.end()
+
+    def logs(self) -> Iterator[tuple[str, str]]:
+        """Return what each process said."""
+        for path in sorted(self._folder.glob("log-*")):
+            name = path.stem.split("-")[1]
+            yield name, path.read_text(encoding="utf-8", errors="replace")
+
+    def _start(self, name: str, *command: Any) -> None:
+        log = self._folder / f"log-{name}-{next(self._numbers):03d}.txt"
+        words = [sys.executable, *map(str, command)]
+        self.parts[name] = Part(words, self.core.environment, log)
+
+
+def _whole_lines(path: Path) -> list[dict[str, Any]]:
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    return [json.loads(line) for line in text.rpartition("\n")[0].splitlines()]
+
+
+class Soak:
+    """The script: what happens when."""
+
+    def __init__(self, system: System, seed: int) -> None:
+        self._system = system
+        self._rng = np.random.default_rng(seed)
+        self._due: list[tuple[float, int, Callable[[], None]]] = []
+        self._numbers = itertools.count()
+        self._lives: dict[str, int] = {}
+        self.faults: list[dict[str, Any]] = []
+        self.samples: list[dict[str, Any]] = []
+        self.deaths: list[dict[str, Any]] = []
+        self.began = self.ended = 0.0
+
+    def run(self, minutes: float) -> None:
+        """Live through it."""
+        self._begin()
+        self.began, end = time.time(), time.time() + 60.0 * minutes
+        script = self._script(end)
+        next_fault, next_sample = self.began + 5.0, self.began
+        while (now := time.time()) < end:
+            while self._due and self._due[0][0] <= now:
+                heapq.heappop(self._due)[2]()
+            if now >= next_sample:
+                next_sample = now + 1.0
+                self._sample(now)
+            if now >= next_fault and end - now > 20.0:
+                next_fault = self._inject(next(script))
+            time.sleep(_TICK_S)
+        while self._due:
+            heapq.heappop(self._due)[2]()
+        self.ended = time.time()
+
+    def _begin(self) -> None:
+        self._system.core.start()
+        for start in ("witness", "robot", "node", "viewer"):
+            getattr(self._system, f"start_{start}")()
+        deadline = time.monotonic() + PATIENCE_S
+        while not any(line["topic"] != "localization_status" for line in self._heard()):
+            if time.monotonic() > deadline:
+                sys.exit(f"the robot was not found: {dict(self._system.logs())}")
+            time.sleep(1.0)
+
+    def _heard(self) -> list[dict[str, Any]]:
+        return _whole_lines(self._system.said)
+
+    def _script(self, end: float) -> Iterator[Callable[[], tuple[str, float]]]:
+        """Yield all that can happen, each as often as the others, in another order each time."""
+        quiet_until = self.began + FIRST_LIFE * (end - self.began)
+        while True:
+            for i in self._rng.permutation(len(HAPPENINGS)):
+                happening = HAPPENINGS[i]
+                if time.time() > quiet_until or happening not in KILLS_NODE:
+                    yield lambda happening=happening: happening(self)
+
+    def _inject(self, happening: Callable[[], tuple[str, float]]) -> float:
+        """Let something happen; return when the next thing may."""
+        begin = time.time()
+        kind, seconds = happening()
+        self.faults.append({"kind": kind, "begin": begin, "end": begin + seconds})
+        print(f"{begin - self.began:7.1f} s  {kind}, {seconds:.1f} s", flush=True)
+        calm = self._rng.uniform(*(CALM_AFTER_A_KILL_S if "kill" in kind else CALM_S))
+        return begin + seconds + (HASTE_S if self._rng.random() < HASTE else calm)
+
+    def _sample(self, now: float) -> None:
+        for name, part in list(self._system.parts.items()):
+            if not part.is_running:
+                self.deaths.append({"who": name, "at": now, "said": part.said[-2000:]})
+                self._system.parts.pop(name).end()
+                getattr(self._system, f"start_{name}")()
+                print(f"{now - self.began:7.1f} s  {name} DIED BY ITSELF", flush=True)
+            elif (figures := part.figures()) is not None:
+                self.samples.append({"who": name, "at": now, "pid": part.pid, **figures})
+
+    def _later(self, seconds: float, act: Callable[[], None]) -> None:
+        heapq.heappush(self._due, (time.time() + seconds, next(self._numbers), act))
+
+    def _between(self, least: float, most: float) -> float:
+        return float(self._rng.uniform(least, most))
+
+    # ---- what can happen: each returns what it is called, and how long it lasts
+
+    def people_walk(self) -> tuple[str, float]:
+        """Let people walk about, from now on until others come."""
+        self._system.tell(do="people", count=int(self._rng.integers(3, 10)), manner="walk")
+        return "people walk", 0.0
+
+    def people_crowd(self) -> tuple[str, float]:
+        """Let people stand around the robot and go with it."""
+        self._system.tell(do="people", count=int(self._rng.integers(2, 6)), manner="surround")
+        seconds = self._between(4.0, 10.0)
+        self._later(seconds, lambda: self._system.tell(do="people", count=2, manner="walk"))
+        return "a crowd", seconds
+
+    def scans_dropped(self) -> tuple[str, float]:
+        """Silence the sensor."""
+        return "scans dropped", self._wire("drop", ["scan"], self._between(1.0, 6.0))
+
+    def odometry_dropped(self) -> tuple[str, float]:
+        """Silence the wheels."""
+        return "odometry dropped", self._wire("drop", ["/tf"], self._between(1.0, 6.0))
+
+    def silence(self) -> tuple[str, float]:
+        """Silence the robot."""
+        return "all dropped", self._wire("drop", SENSORS, self._between(1.0, 6.0))
+
+    def burst(self) -> tuple[str, float]:
+        """Let a second of scans and odometry come at once."""
+        return "burst of all", self._wire("hold", SENSORS, self._between(0.8, 2.0))
+
+    def burst_of_scans(self) -> tuple[str, float]:
+        """Let a second of scans come at once."""
+        return "burst of scans", self._wire("hold", ["scan"], self._between(0.8, 2.0))
+
+    def odometry_late(self) -> tuple[str, float]:
+        """Let odometry come later than its scans."""
+        delay_s = self._between(0.1, 0.8)
+        return "odometry late", self._wire("late", ["/tf"], self._between(3.0, 6.0), delay_s)
+
+    def scans_late(self) -> tuple[str, float]:
+        """Let scans come later than their odometry."""
+        delay_s = self._between(0.1, 0.8)
+        return "scans late", self._wire("late", ["scan"], self._between(3.0, 6.0), delay_s)
+
+    def _wire(self, kind: str, topics: list[str], seconds: float, delay_s: float = 0.0) -> float:
+        trouble = {"kind": kind, "topics": topics, "seconds": seconds, "delay_s": delay_s}
+        self._system.tell(do="wire", **trouble)
+        return seconds + delay_s
+
+    def clock_ahead(self) -> tuple[str, float]:
+        """Set the clock of the robot ahead."""
+        by = self._rng.choice([self._between(0.1, 2.0), self._between(2.0, 60.0), HOUR_S])
+        self._system.tell(do="clock", by=float(by))
+        return "clock ahead", 0.0
+
+    def clock_back(self) -> tuple[str, float]:
+        """Set the clock of the robot back."""
+        by = self._rng.choice([self._between(0.1, 2.0), self._between(2.0, 60.0), HOUR_S])
+        self._system.tell(do="clock", by=-float(by))
+        return "clock back", 0.0
+
+    def kidnap(self) -> tuple[str, float]:
+        """Put the robot elsewhere; nothing tells of it."""
+        self._system.tell(do="teleport")
+        return "silent kidnap", 0.0
+
+    def carry(self) -> tuple[str, float]:
+        """Carry the robot off; its wheels tell of it."""
+        seconds = self._between(2.0, 5.0)
+        self._system.tell(do="carry", seconds=seconds)
+        return "carried off", seconds
+
+    def push(self) -> tuple[str, float]:
+        """Kick the robot."""
+        degrees = self._between(-40.0, 40.0)
+        self._system.tell(do="push", metres=self._between(0.2, 0.8), degrees=degrees)
+        return "pushed", 0.5
+
+    def wrong_hint(self) -> tuple[str, float]:
+        """Say as a person where the robot is, and be wrong."""
+        self._system.tell(do="hint")
+        return "wrong hint", 0.0
+
+    def freeze(self) -> tuple[str, float]:
+        """Give the node no processor for a while."""
+        node, seconds = self._system.parts["node"], self._between(1.0, 4.0)
+        node.send(signal.SIGSTOP)
+        self._later(seconds, lambda: node.send(signal.SIGCONT))
+        return "node frozen", seconds
+
+    def kill_node(self) -> tuple[str, float]:
+        """Kill the node; it comes back."""
+        return "kill node", self._kill("node", self._system.start_node)
+
+    def kill_node_and_kidnap(self) -> tuple[str, float]:
+        """Carry the robot off while nobody listens."""
+        seconds = self._kill("node", self._system.start_node)
+        self._system.tell(do="teleport")
+        return "kill node, kidnap meanwhile", seconds
+
+    def kill_node_and_file(self) -> tuple[str, float]:
+        """Kill the node, and damage its saved pose."""
+        seconds = self._kill("node", self._system.start_node)
+        if self._system.saved_pose.is_file():
+            size = self._system.saved_pose.stat().st_size
+            os.truncate(self._system.saved_pose, int(self._rng.integers(0, size)))
+        return "kill node, saved pose cut", seconds
+
+    def kill_robot(self) -> tuple[str, float]:
+        """Restart the robot's computer; its odometry begins anew."""
+        return "kill robot", self._kill("robot", self._restart_robot)
+
+    def kill_robot_and_carry(self) -> tuple[str, float]:
+        """Carry the robot off while its computer is restarted."""
+        return "kill robot, kidnap meanwhile", self._kill("robot", self._restart_robot_elsewhere)
+
+    def kill_viewer(self) -> tuple[str, float]:
+        """Let the viewer's browser crash."""
+        return "kill viewer", self._kill("viewer", self._system.start_viewer)
+
+    def kill_roscore(self) -> tuple[str, float]:
+        """Kill the master of ROS; it comes back."""
+        seconds = self._between(0.5, 4.0)
+        self._system.core.kill()
+        self._later(seconds, self._system.core.start)
+        return "kill roscore", seconds
+
+    def kill_all(self) -> tuple[str, float]:
+        """Let the power fail: master, node and robot begin anew."""
+        self._system.core.kill()
+        self._later(0.5, self._system.core.start)
+        seconds = self._kill("node", self._system.start_node)
+        return "kill roscore, node, robot", max(seconds, self._kill("robot", self._restart_robot))
+
+    def _kill(self, name: str, start: Callable[[], None]) -> float:
+        seconds = self._between(0.2, 4.0)
+        if name in self._system.parts:
+            self._system.kill(name)
+            self._later(seconds, start)
+        return seconds
+
+    def _restart_robot(self) -> None:
+        self._system.start_robot(*self._system.where_the_robot_died())
+
+    def _restart_robot_elsewhere(self) -> None:
+        with self._system.truth.open("a", encoding="utf-8") as lines:
+            now = time.time()
+            moved = {"kind": "moved", "how": "off", "at": now, "until": now}
+            lines.write(json.dumps(moved) + "\n")
+        self._system.start_robot()
+
+
+KILLS_NODE = (Soak.kill_node, Soak.kill_node_and_kidnap, Soak.kill_node_and_file, Soak.kill_all)
+HAPPENINGS = (
+    Soak.people_walk,
+    Soak.people_crowd,
+    Soak.scans_dropped,
+    Soak.odometry_dropped,
+    Soak.silence,
+    Soak.burst,
+    Soak.burst_of_scans,
+    Soak.odometry_late,
+    Soak.scans_late,
+    Soak.clock_ahead,
+    Soak.clock_back,
+    Soak.kidnap,
+    Soak.carry,
+    Soak.push,
+    Soak.wrong_hint,
+    Soak.freeze,
+    Soak.kill_robot,
+    Soak.kill_robot_and_carry,
+    Soak.kill_viewer,
+    Soak.kill_roscore,
+    *KILLS_NODE,
+)
+
+
+def main() -> None:
+    """Run, judge, report."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--minutes", type=float, default=30.0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--world", choices=WORLDS, default="office")
+    parser.add_argument("--mode", choices=("full", "bootstrap"), default="full")
+    parser.add_argument("--report", type=Path, help="folder; without it, print only")
+    parser.add_argument("--keep", type=Path, help="folder for all that was written down meanwhile")
+    options = parser.parse_args()
+    if (lacking := why_missing()) is not None:
+        sys.exit(lacking)
+    with contextlib.ExitStack() as stack:
+        folder = options.keep or Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        folder.mkdir(parents=True, exist_ok=True)
+        system = System(folder, options.world, options.mode, options.seed)
+        soak = Soak(system, options.seed)
+        try:
+            soak.run(options.minutes)
+        finally:
+            system.end()
+        record = {
+            "settings": {
+                name: getattr(options, name) for name in ("minutes", "seed", "world", "mode")
+            },
+            "machine": this_machine(),
+            "began": soak.began,
+            "ended": soak.ended,
+            "faults": soak.faults,
+            "samples": soak.samples,
+            "deaths": soak.deaths,
+            "logs": list(system.logs()),
+            "truth": _whole_lines(system.truth),
+            "said": _whole_lines(system.said),
+            "seen": _whole_lines(system.seen),
+        }
+        (folder / "record.json").write_text(json.dumps(record), encoding="utf-8")
+    figures = judge(record)
+    print(write_report(figures, options.report))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,110 @@
+"""The witnesses of `soak.py`: what a node of ROS 1 says, and what its page shows, as lines of JSON.
+
+python benchmarks/soak_witness.py ros FILE
+python benchmarks/soak_witness.py page FILE WEBSOCKET_URL
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+import threading
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+NODE = "/firstfix"
+POSE = "geometry_msgs/PoseWithCovarianceStamped"
+TOPICS = {
+    "amcl_pose": POSE,
+    "initialpose": POSE,
+    "/tf": "tf2_msgs/TFMessage",
+    "localization_status": "diagnostic_msgs/DiagnosticArray",
+}
+_CONNECT_AGAIN_S = 0.5
+_HANDSHAKE_S = 3.0
+
+
+class Lines:
+    """A file of JSON, a line each, from any thread."""
+
+    def __init__(self, path: str) -> None:
+        self._file = Path(path).open("a", encoding="utf-8", buffering=1)  # noqa: SIM115 - to the end
+        self._lock = threading.Lock()
+
+    def write(self, **line: Any) -> None:
+        """Write a line."""
+        with self._lock:
+            self._file.write(json.dumps(line) + "\n")
+
+
+def listen(lines: Lines) -> None:
+    """Write down what the node publishes, and nobody else."""
+    import rospy
+    from soak_robot import stay_known
+
+    from firstfix.adapters.ros1_types import message_class
+    from firstfix.formats.messages import planar, to_pose, to_seconds, to_transform
+
+    def hear(topic: str, message: Any) -> None:
+        at = time.time()
+        if message._connection_header["callerid"] != NODE:
+            return
+        if topic == "/tf":
+            for transform in map(to_transform, message.transforms):
+                pose = planar(transform)
+                lines.write(topic=topic, at=at, stamp=transform.stamp, pose=pose)
+        elif topic == "localization_status":
+            values = {value.key: value.value for value in message.status[0].values}
+            stamp, text = to_seconds(message.header.stamp), message.status[0].message
+            lines.write(topic=topic, at=at, stamp=stamp, state=values["state"], text=text)
+        else:
+            told = to_pose(message)
+            lines.write(topic=topic, at=at, stamp=told.stamp, pose=planar(told))
+
+    rospy.init_node("witness")
+    for topic, kind in TOPICS.items():
+        rospy.Subscriber(topic, message_class(kind), partial(hear, topic), tcp_nodelay=True)
+    stay_known()
+    rospy.spin()
+
+
+async def look(lines: Lines, url: str) -> None:
+    """Write down what the page is told, and connect again whenever it is cut off."""
+    from websockets.asyncio.client import connect
+    from websockets.exceptions import WebSocketException
+
+    while True:
+        try:
+            async with connect(url, open_timeout=_HANDSHAKE_S, close_timeout=1) as viewer:
+                lines.write(what="open", at=time.time())
+                async for message in viewer:
+                    if isinstance(message, str):
+                        see(lines, json.loads(message))
+        except (OSError, WebSocketException, asyncio.TimeoutError) as error:
+            lines.write(what="cut", at=time.time(), why=type(error).__name__)
+        await asyncio.sleep(_CONNECT_AGAIN_S)
+
+
+def see(lines: Lines, message: dict[str, Any]) -> None:
+    """Write down a message of the page."""
+    what, at = message["type"], time.time()
+    if what == "state":
+        lines.write(what=what, at=at, stamp=message["stamp"], state=message["state"])
+    elif what == "error" or message.get("kind") == "warning":
+        lines.write(what="complaint", at=at, text=message.get("detail") or message["text"])
+
+
+def main() -> None:
+    """Watch until ended."""
+    kind, path, *url = sys.argv[1:]
+    if kind == "ros":
+        listen(Lines(path))
+    else:
+        asyncio.run(look(Lines(path), *url))
+
+
+if __name__ == "__main__":
+    main()
