@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 VENV_ARGS ?= $(shell $(PYTHON) -c 'import rospy' 2>/dev/null && echo --system-site-packages)
 CASES ?= $(wildcard ../shared/cases/*/)
 
-.PHONY: demo test check bench recording clean
+.PHONY: demo test check bench recording docs dist release-matrix lock clean
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV_ARGS) $(VENV)
@@ -35,6 +35,23 @@ bench: $(STAMP)
 
 recording: $(STAMP)
 	$(BIN)/python benchmarks/record_demo.py docs/demo.gif
+
+docs: $(STAMP)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+$(VENV)/.release: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[release]'
+	touch $@
+
+dist: $(VENV)/.release
+	.ci/release $(BIN)/python
+
+release-matrix: dist
+	$(BIN)/python .ci/release_matrix.py
+
+lock: $(VENV)/.release
+	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.10 --generate-hashes --no-annotate \
+	    --custom-compile-command 'make lock' --output-file requirements.lock pyproject.toml
 
 clean:
 	rm -rf $(VENV) out dist build

@@ -1,10 +1,22 @@
-"""What the doctor says of ROS."""
+"""What the doctor says of packages, caches, a map and ROS."""
 
 import importlib.metadata
 import sys
 from pathlib import Path
 
 import pytest
+
+from firstfix.cli import doctor
+from firstfix.cli.doctor import told_as_unkept
+
+UNKEPT = "cannot cache function '_sweep': no locator available for file 'clearance.py'"
+
+
+def line(ended, title: str) -> str:
+    """Return the line of this title."""
+    assert ended.status == 0, ended
+    (found,) = [line for line in ended.out.splitlines() if line.startswith(title)]
+    return found
 
 
 @pytest.fixture
@@ -16,7 +28,7 @@ def ros_line(cli, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
             (tmp_path / package).mkdir()
             (tmp_path / package / "__init__.py").touch()
         monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
-        for name in ("ROS_DISTRO", "AMENT_PREFIX_PATH"):
+        for name in ("ROS_DISTRO", "AMENT_PREFIX_PATH", *doctor.VARIABLES):
             monkeypatch.delenv(name, raising=False)
         for name, value in variables.items():
             monkeypatch.setenv(name, value)
@@ -44,9 +56,66 @@ def test_ros_sourced_for_another_python(ros_line) -> None:
     assert "humble, no client library" in ros_line(ROS_DISTRO="humble")
 
 
-def test_dds_is_named(cli) -> None:
-    (line,) = [line for line in cli("doctor").out.splitlines() if line.startswith("cyclonedds")]
+def test_variables_that_part_robots_are_told(ros_line) -> None:
+    assert "ROS_DOMAIN_ID=42" in ros_line(ROS_DOMAIN_ID="42")
+
+
+@pytest.mark.parametrize("uri", ["http://127.0.0.1:1", "http://127.0.0.1:x", "nonsense"])
+def test_a_master_that_does_not_answer(ros_line, uri: str) -> None:
+    assert f"no master at {uri}" in ros_line("rospy", ROS_MASTER_URI=uri)
+
+
+@pytest.mark.parametrize(("package", "extra"), [("matplotlib", "plot"), ("cyclonedds", "dds")])
+def test_extras_are_named(cli, package: str, extra: str) -> None:
+    said = line(cli("doctor"), package)
     try:
-        assert importlib.metadata.version("cyclonedds") in line
+        assert importlib.metadata.version(package) in said
     except importlib.metadata.PackageNotFoundError:
-        assert "pip install 'firstfix[dds]'" in line
+        assert f"pip install 'firstfix[{extra}]'" in said
+
+
+def test_every_package_that_is_needed_is_named() -> None:
+    needed = importlib.metadata.requires("firstfix") or []
+    names = {need.split(">")[0] for need in needed if "extra ==" not in need}
+    assert names <= set(doctor.PACKAGES)
+
+
+def test_a_map_that_can_be_used(cli, unique: tuple[Path, Path]) -> None:
+    assert "10.0 x 8.0 m, " in line(cli("doctor", unique[0]), "map")
+
+
+def test_a_map_that_cannot(cli) -> None:
+    ended = cli("doctor", "nowhere.yaml")
+    assert ended.status == 2
+    assert ended.err.startswith("firstfix: expected ")
+
+
+def test_a_cache_that_cannot_be_written(cli, monkeypatch, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("FIRSTFIX_CACHE_DIR", str(tmp_path / "file" / "cache"))
+    assert "cannot be written" in line(cli("doctor"), "cache")
+
+
+def test_kernels_that_cannot_be_kept(cli, monkeypatch) -> None:
+    def raising() -> str:
+        raise RuntimeError(UNKEPT)
+
+    monkeypatch.setattr(doctor, "_tried_kernels", raising)
+    ended = cli("doctor")
+    assert ended.status == 1
+    assert "set NUMBA_CACHE_DIR" in ended.out
+
+
+def test_any_command_says_so(cli, monkeypatch) -> None:
+    def raising(_path: Path) -> str:
+        raise RuntimeError(UNKEPT)
+
+    monkeypatch.setattr(doctor, "_map", raising)
+    ended = cli("doctor", "map.yaml")
+    assert ended.status == 2
+    assert ended.err.startswith("firstfix: expected ")
+    assert "set NUMBA_CACHE_DIR" in ended.err
+
+
+def test_other_errors_stay_what_they_are() -> None:
+    assert told_as_unkept(RuntimeError("anything else")) is None

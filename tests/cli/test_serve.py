@@ -125,11 +125,15 @@ def test_a_port_that_is_taken(cli) -> None:
         (("house", "--token", "short"), ("8 characters",)),
         (("house", "scan:=front"), ("scan:=front", "--robot")),
         (("atlantis",), ("office, rooms", "atlantis")),
-        (("no.yaml", "--robot", "dds"), ("no.yaml",)),
     ],
 )
 def test_what_cannot_be_served(cli, arguments: tuple[str, ...], words: tuple[str, ...]) -> None:
     assert_one_line(cli("serve", *arguments), *words)
+
+
+def test_a_map_that_is_not_there(cli) -> None:
+    pytest.importorskip("cyclonedds")
+    assert_one_line(cli("serve", "no.yaml", "--robot", "dds"), "no.yaml")
 
 
 def test_arguments_of_ros_that_are_none(cli, unique: Files) -> None:

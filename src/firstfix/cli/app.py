@@ -18,7 +18,7 @@ import typer
 from firstfix import __version__
 from firstfix.cli.bench import bench
 from firstfix.cli.demo import demo
-from firstfix.cli.doctor import doctor
+from firstfix.cli.doctor import doctor, told_as_unkept
 from firstfix.cli.locate import locate
 from firstfix.cli.map import map_app
 from firstfix.cli.nodes import AFTER_DASHES, PASSED_ON, dds, ros1, ros2
@@ -85,6 +85,12 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except FirstfixError as error:
         # One line, whatever a file's content put into the sentence.
         typer.echo(f"firstfix: {' '.join(str(error).split())}", err=True)
+        return WRONG_INPUT
+    except RuntimeError as error:
+        sentence = told_as_unkept(error)
+        if sentence is None:
+            raise
+        typer.echo(f"firstfix: {sentence}", err=True)
         return WRONG_INPUT
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else int(end.code is not None)

@@ -6,37 +6,104 @@ import importlib.metadata
 import importlib.util
 import os
 import platform
+import socket
 import sys
+import tempfile
 import time
+import urllib.parse
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
 from firstfix import __version__
+from firstfix.cli.progress import working
 
-PACKAGES = ("numpy", "numba", "pillow", "pyyaml", "rosbags", "typer", "rich", "platformdirs")
-PLOTTING = "matplotlib"
-DDS = "cyclonedds"
+PACKAGES = (
+    "numpy",
+    "numba",
+    "llvmlite",
+    "pillow",
+    "pyyaml",
+    "rosbags",
+    "typer",
+    "rich",
+    "platformdirs",
+    "starlette",
+    "uvicorn",
+    "websockets",
+)
+EXTRAS = {
+    "matplotlib": "missing, no pictures: pip install 'firstfix[plot]'",
+    "cyclonedds": "missing, no ROS 2 without ROS: pip install 'firstfix[dds]'",
+}
 
 # What a node of ROS uses where it is there: a client library, and messages that few have.
 CLIENTS = ("rclpy", "rospy")
 MESSAGES = ("tf2_msgs", "diagnostic_msgs", "nav2_msgs", "kobuki_ros_interfaces")
+VARIABLES = ("ROS_DOMAIN_ID", "RMW_IMPLEMENTATION", "ROS_LOCALHOST_ONLY", "CYCLONEDDS_URI")
+_PATIENCE_S = 1.0
+
+# In numba's words, raised where a kernel is declared.
+_UNKEPT = "no locator available"
 
 
-def doctor() -> None:
-    """Say what is installed, where the cache is, whether the kernels work and ROS is seen."""
-    _say("firstfix", __version__)
-    _say("python", f"{platform.python_version()} on {platform.platform()}, {os.cpu_count()} cores")
+def doctor(
+    map_path: Annotated[
+        Path | None, typer.Argument(metavar="[MAP]", help="A map to try, as map_server reads it.")
+    ] = None,
+) -> None:
+    """Say what is installed, whether caches and kernels work, which ROS is seen, if a map is fit.
+
+    Exit status 1 if the kernels do not work, 2 if the map cannot be used.
+    """
+    _say("firstfix", f"{__version__} in {Path(__file__).parents[1]}")
+    _say("python", f"{platform.python_version()} on {platform.platform()}, {sys.prefix}")
+    _say("cores", f"{os.cpu_count()}, {_usable_cores()} of them for this process; a scan takes one")
     for package in PACKAGES:
         _say(package, _version(package) or "missing: run pip install firstfix again")
-    _say(PLOTTING, _version(PLOTTING) or "missing, no pictures: pip install 'firstfix[plot]'")
-    _say(DDS, _version(DDS) or "missing, no ROS 2 without ROS: pip install 'firstfix[dds]'")
+    for package, without in EXTRAS.items():
+        _say(package, _version(package) or without)
     _say("cache", _cache())
-    _say("kernels", _kernels())
+    with working("compiling the kernels, which takes half a minute at most"):
+        kernels, works = _kernels()
+    _say("kernels", kernels)
+    if map_path is not None and works:
+        _say("map", _map(map_path))
     _say("ROS", _ros())
+    if not works:
+        raise typer.Exit(1)
+
+
+def told_as_unkept(error: RuntimeError) -> str | None:
+    """Return a sentence with a remedy, if numba has no folder for compiled kernels.
+
+    Parameters
+    ----------
+    error : RuntimeError
+        What came from numba.
+
+    Returns
+    -------
+    str or None
+        None for any other error.
+    """
+    if _UNKEPT not in str(error):
+        return None
+    return (
+        "expected a folder where compiled kernels can be kept, received none that can be written; "
+        "set NUMBA_CACHE_DIR to one"
+    )
 
 
 def _say(title: str, text: str) -> None:
     typer.echo(f"{title:<13}{text}")
+
+
+def _usable_cores() -> int:
+    # Containers and taskset give a process fewer than there are; not every system can tell.
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
 def _version(package: str) -> str | None:
@@ -51,13 +118,38 @@ def _cache() -> str:
 
     folder = cache_folder()
     size = sum(p.stat().st_size for p in folder.rglob("*") if p.is_file()) if folder.exists() else 0
-    return f"{folder}, {size / 1e6:.1f} MB"
+    said = f"{folder}, {size / 1e6:.1f} MB"
+    if _can_be_written(folder):
+        return said
+    return f"{said}, cannot be written: every start prepares its map anew; set FIRSTFIX_CACHE_DIR"
 
 
-def _kernels() -> str:
+def _can_be_written(folder: Path) -> bool:
+    there = next(path for path in (folder, *folder.parents) if path.exists())
+    try:
+        # A folder that is not there yet is made when it is needed, in the nearest that is.
+        with tempfile.TemporaryFile(dir=there):
+            return True
+    except OSError:
+        return False
+
+
+def _kernels() -> tuple[str, bool]:
+    """Return what to say of the kernels, and whether they work."""
+    try:
+        return _tried_kernels(), True
+    except RuntimeError as error:
+        sentence = told_as_unkept(error)
+        if sentence is None:
+            raise
+        return sentence, False
+
+
+def _tried_kernels() -> str:
     import numpy as np
 
     from firstfix.core.se2 import SE2
+    from firstfix.fields.raycast import cast_ray_leaping
     from firstfix.global_localization.locate import Locator
     from firstfix.sim.lidar import Lidar
     from firstfix.sim.world import identical_rooms
@@ -71,21 +163,50 @@ def _kernels() -> str:
     result = locator.locate(scan)
     return (
         f"ready after {loaded:.2f} s; then {result.elapsed_s:.3f} s a scan ({result.verdict.value})"
+        f"; kept in {cast_ray_leaping.stats.cache_path}"
     )
+
+
+def _map(path: Path) -> str:
+    from firstfix.formats.map_check import check_map
+    from firstfix.formats.map_server import load_map
+
+    load_map(path)
+    found = check_map(path)
+    said = f"{found.width_m:.1f} x {found.height_m:.1f} m, {found.free_area:.0f} m² free"
+    if found.warnings:
+        return f"{said}; {len(found.warnings)} warnings: firstfix map check {path}"
+    return f"{said}, no traps"
 
 
 def _ros() -> str:
     distribution = os.environ.get("ROS_DISTRO")
     clients, messages = _found(CLIENTS), _found(MESSAGES)
     if distribution is None and not clients:
-        return "not seen; not needed for maps, bags and scans in files, nor for firstfix dds"
-    said = f"{distribution or 'no ROS_DISTRO'}, {' and '.join(clients) or 'no client library'}"
+        said = "not seen; not needed for maps, bags and scans in files, nor for firstfix dds"
+    else:
+        said = f"{distribution or 'no ROS_DISTRO'}, {' and '.join(clients) or 'no client library'}"
     if messages:
         said += f"; {', '.join(messages)}"
+    for name in VARIABLES:
+        if os.environ.get(name):
+            said += f"; {name}={os.environ[name]}"
+    if "rospy" in clients:
+        said += f"; {_master()}"
     prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     if "rclpy" in clients and sys.prefix not in prefixes:
         said += f"; for ros2 run: export AMENT_PREFIX_PATH={sys.prefix}:$AMENT_PREFIX_PATH"
     return said
+
+
+def _master() -> str:
+    uri = os.environ.get("ROS_MASTER_URI", "http://localhost:11311")
+    try:
+        where = urllib.parse.urlsplit(uri)
+        with socket.create_connection((where.hostname, where.port or 80), _PATIENCE_S):
+            return f"a master at {uri}"
+    except (OSError, ValueError):
+        return f"no master at {uri} (ROS_MASTER_URI)"
 
 
 def _found(names: tuple[str, ...]) -> list[str]:

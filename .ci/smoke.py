@@ -1,0 +1,86 @@
+"""Tries an installed firstfix, and prints what it found as a line of JSON.
+
+Run by the Python of the environment, outside the checkout. Everything through the installed
+command, as a user would; only the tiny map and its scan are made from Python.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+WHERE = (2.0, 2.0, 0.5)
+MAKE = f"""
+import numpy as np
+import firstfix as ff
+from firstfix.formats.npz_writer import save_npz
+from firstfix.sim.lidar import Lidar
+from firstfix.sim.world import identical_rooms
+
+grid = identical_rooms(1)
+ff.save_map(grid, "map.yaml")
+scan = Lidar().scan(grid, ff.SE2{WHERE}, np.random.default_rng(0))
+save_npz(ff.Recording((scan,)), "scan.npz")
+"""
+IMPORT = """
+import sys, time
+start = time.perf_counter()
+import firstfix
+print(time.perf_counter() - start)
+assert "numpy" not in sys.modules
+"""
+PROGRAM = Path(sys.executable).parent / "firstfix"
+
+
+def said(*command: str | Path) -> str:
+    """Return what a command says; anything but success is an error."""
+    done = subprocess.run(
+        [str(part) for part in command], capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise SystemExit(f"{command}: status {done.returncode}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def timed(*command: str | Path) -> tuple[str, float]:
+    """Return what a command says, and how long it took."""
+    start = time.perf_counter()
+    return said(*command), time.perf_counter() - start
+
+
+def main() -> None:
+    """Try it all in an empty folder, with an empty cache."""
+    os.chdir(tempfile.mkdtemp(prefix="firstfix-smoke-"))
+    os.environ["FIRSTFIX_CACHE_DIR"] = str(Path("cache").resolve())
+    version = importlib.metadata.version("firstfix")
+    assert said(PROGRAM, "--version").split() == ["firstfix", version]
+    for command in ("locate", "track", "map", "bench", "demo", "serve", "doctor"):
+        assert "--help" in said(PROGRAM, command, "--help")
+    import_s = min(float(said(sys.executable, "-c", IMPORT)) for _ in range(5))
+
+    said(sys.executable, "-c", MAKE)
+    _, cold_s = timed(PROGRAM, "locate", "map.yaml", "scan.npz", "--json")
+    answer, warm_s = timed(PROGRAM, "locate", "map.yaml", "scan.npz", "--json")
+    found = json.loads(answer)
+    assert found["verdict"] == "UNIQUE"
+    assert math.dist(found["pose"], WHERE) < 0.05
+
+    doctor = said(PROGRAM, "doctor")
+    assert "ready after" in doctor
+    said(sys.executable, "-c", "import firstfix.adapters.web.server")
+    said(PROGRAM, "demo", "--headless")
+    figures = {"import_ms": 1e3 * import_s, "cold_s": cold_s, "warm_s": warm_s}
+    for package in ("numpy", "numba"):
+        figures[package] = importlib.metadata.version(package)
+    sys.stdout.write(json.dumps(figures) + "\n")
+
+
+if __name__ == "__main__":
+    main()
