@@ -1,0 +1,62 @@
+"""Commands, options, targets and scripts that pages name are there."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from typer.main import get_command
+
+from firstfix.cli.app import app
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted([*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")])
+# What stands alone on a line of code, or between backticks; comments and what follows a pipe left out.
+CODE = re.compile(r"^ {4,}(\S.*)$|`([^`]+)`", re.MULTILINE)
+COMMAND = re.compile(r"^(?:\S*/)?firstfix ([a-z].*)")
+TARGET = re.compile(r"(?:^|\s)make ([a-z][a-z-]*)")
+SCRIPT = re.compile(r"\b(?:benchmarks|fuzz|docs|\.ci)/[\w/-]+\.py\b")
+
+
+def code_of(page: Path) -> list[str]:
+    """Return all code of a page, in lines."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    return [re.split(r" +# ", line or quoted)[0] for line, quoted in CODE.findall(text)]
+
+
+def check_command(line: str) -> None:
+    """Walk from the program to the command, and look every option up."""
+    command = get_command(app)
+    words = shlex.split(line.replace("...", ""))
+    while words and hasattr(command, "commands"):
+        name = words.pop(0).rstrip(",;")
+        assert name in command.commands, f"firstfix {line}: no command {name}"
+        command = command.commands[name]
+    options = {option for given in command.params for option in (*given.opts, "--help")}
+    for word in words[: words.index("--")] if "--" in words else words:
+        if re.match(r"--?[a-z]", word):
+            assert word.split("=")[0] in options, f"firstfix {line}: no option {word}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_are_there(page: Path) -> None:
+    for code in code_of(page):
+        for found in COMMAND.findall(code):
+            check_command(found)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_targets_and_scripts_are_there(page: Path) -> None:
+    targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    for code in code_of(page):
+        assert set(TARGET.findall(code)) <= set(targets), code
+        for script in SCRIPT.findall(code):
+            assert (ROOT / script).exists(), f"{page.name} names {script}"
+
+
+@pytest.mark.parametrize(
+    "line", ["lokate map.yaml", "locate map.yaml scan.npz --plott x.png", "map chek map.yaml"]
+)
+def test_what_is_not_there_is_noticed(line: str) -> None:
+    with pytest.raises(AssertionError, match="no (command|option)"):
+        check_command(line)

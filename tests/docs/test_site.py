@@ -1,0 +1,92 @@
+"""The site builds without a warning, and shows what pages mean."""
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import firstfix
+from firstfix.system.transitions import TABLE
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+# Paragraphs in which a list, a table or a block of code was not seen as one: a line is missing
+# before it, or the indent is not four spaces.
+RUN_TOGETHER = re.compile(r"<p>(?:(?!</p>).)*\n(?:- |\* |\d+\. |\||```)", re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build it, as `make docs` does."""
+    for needed in ("mkdocs", "material", "mkdocstrings"):
+        if importlib.util.find_spec(needed) is None:
+            pytest.skip(f"without {needed}: pip install 'firstfix[docs]'")
+    folder = tmp_path_factory.mktemp("site")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", folder],
+        cwd=ROOT,
+        env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+@pytest.mark.slow
+def test_every_public_name_has_its_entry(site: Path) -> None:
+    page = (site / "reference" / "python.html").read_text(encoding="utf-8")
+    for name in firstfix.__all__:
+        assert re.search(rf'<h3 id="firstfix\.[\w.]*{name}"', page), name
+    assert page.count("Parameters:") > len(firstfix.__all__) // 2
+    assert page.count("Raises:") > 5
+
+
+@pytest.mark.slow
+def test_lists_and_tables_are_seen_as_such(site: Path) -> None:
+    for page in site.rglob("*.html"):
+        found = RUN_TOGETHER.search(page.read_text(encoding="utf-8"))
+        assert found is None, f"{page.relative_to(site)}: {found[0][-200:] if found else ''}"
+
+
+@pytest.mark.slow
+def test_what_pages_link_to_outside_docs_is_there(site: Path) -> None:
+    assert (site / "CONTRIBUTING.html").exists()
+    assert list((site / "benchmarks" / "reports").rglob("*.png"))
+
+
+@pytest.mark.slow
+def test_nothing_is_loaded_from_elsewhere(site: Path) -> None:
+    for page in site.rglob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        assert not re.search(r'(?:src|<link[^>]*href)="(?:https?:)?//', text), page
+
+
+def test_the_reference_names_every_public_name() -> None:
+    page = (DOCS / "reference" / "python.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^::: firstfix\.(\w+)$", page, re.MULTILINE)) == set(firstfix.__all__)
+
+
+def test_states_in_the_table_are_those_of_the_localizer() -> None:
+    page = (DOCS / "states.md").read_text(encoding="utf-8")
+    rows = [line.strip("|").split("|") for line in page.splitlines() if line.startswith("|")]
+    targets = [cell.strip().removeprefix("to ") for cell in rows[0]]
+    told = {
+        (row[0].strip(), target, event.strip())
+        for row in rows[2:]
+        for target, cell in zip(targets[1:], row[1:], strict=True)
+        for event in cell.split(",")
+        if event.strip()
+    }
+    assert told == {
+        (state.value, after.value, event.value) for (state, event), after in TABLE.items()
+    }
+
+
+def test_the_changelog_has_the_version() -> None:
+    assert f"\n## [{firstfix.__version__}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
