@@ -11,7 +11,7 @@ from firstfix.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")])
-# What stands alone on a line of code, or between backticks; comments and what follows a pipe left out.
+# What stands alone on a line of code, or between backticks.
 CODE = re.compile(r"^ {4,}(\S.*)$|`([^`]+)`", re.MULTILINE)
 COMMAND = re.compile(r"^(?:\S*/)?firstfix ([a-z].*)")
 TARGET = re.compile(r"(?:^|\s)make ([a-z][a-z-]*)")
@@ -20,7 +20,9 @@ SCRIPT = re.compile(r"\b(?:benchmarks|fuzz|docs|\.ci)/[\w/-]+\.py\b")
 
 def code_of(page: Path) -> list[str]:
     """Return all code of a page, in lines."""
-    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    text = re.sub(
+        r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE
+    )
     return [re.split(r" +# ", line or quoted)[0] for line, quoted in CODE.findall(text)]
 
 
@@ -58,5 +60,5 @@ def test_targets_and_scripts_are_there(page: Path) -> None:
     "line", ["lokate map.yaml", "locate map.yaml scan.npz --plott x.png", "map chek map.yaml"]
 )
 def test_what_is_not_there_is_noticed(line: str) -> None:
-    with pytest.raises(AssertionError, match="no (command|option)"):
+    with pytest.raises(AssertionError, match=r"no (command|option)"):
         check_command(line)
