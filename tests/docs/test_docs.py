@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -28,14 +29,28 @@ def test_links_lead_to_files(page):
             assert (page.parent / link).exists(), f"{page.name} links to {link}"
 
 
-def test_settings_are_those_of_the_dataclasses():
-    spec = importlib.util.spec_from_file_location("make_settings", DOCS / "make_settings.py")
+def script(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    return module
+
+
+def test_settings_are_those_of_the_dataclasses():
     written = (DOCS / "reference" / "settings.md").read_text(encoding="utf-8")
-    assert written == module.page(), "run: python docs/make_settings.py"
+    assert written == script("make_settings").page(), "run: python docs/make_settings.py"
+
+
+def test_the_import_graph_is_drawn_as_it_is():
+    graph = script("make_import_graph")
+    page = graph.PAGE.read_text(encoding="utf-8")
+    found = graph.imports()
+    assert page == graph.page_with(found, page), "run: python docs/make_import_graph.py"
+    for room in graph.ROOMS:
+        assert (graph.ROOF, room) in found
+        assert (room, graph.FLOOR) in found
 
 
 def test_every_page_is_in_the_table_of_contents():
