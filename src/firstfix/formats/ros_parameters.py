@@ -66,7 +66,7 @@ def read_parameters(path: Path, node: str, known: frozenset[str]) -> Parameters:
     data = read_bytes(path, what="a YAML file of parameters", limit=MAX_PARAMETER_BYTES)
     root = parse_yaml(data, path, example=f"{node}:")
     sections = list(_sections(root, "", path))
-    if not sections and _is_plain(root, known):
+    if not sections and _is_plain(entries(root, path), known):
         return _flat(root, path)
     own = [section for section in sections if section.node == node]
     shared = {
@@ -123,12 +123,11 @@ def _flat(mapping: yaml.MappingNode, path: Path) -> Parameters:
     return flat
 
 
-def _is_plain(root: yaml.MappingNode, known: frozenset[str]) -> bool:
+def _is_plain(root: Parameters, known: frozenset[str]) -> bool:
     """Tell whether these are parameters themselves rather than nodes that have some."""
     first = {name.partition(".")[0] for name in known}
     return any(
-        not isinstance(value, yaml.MappingNode) or getattr(key, "value", None) in first
-        for key, value in root.value
+        not isinstance(value, yaml.MappingNode) or key in first for key, value in root.items()
     )
 
 
