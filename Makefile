@@ -6,6 +6,8 @@ STAMP := $(VENV)/.installed
 # ROS 1 comes from the distribution's packages: where this Python has it, .venv sees it.
 VENV_ARGS ?= $(shell $(PYTHON) -c 'import rospy' 2>/dev/null && echo --system-site-packages)
 CASES ?= $(wildcard ../shared/cases/*/)
+# Where Python may not keep what it parsed, every process of a test parses everything again.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test check bench recording docs dist release-matrix lock clean
 
@@ -18,7 +20,7 @@ demo: $(STAMP)
 	$(BIN)/firstfix demo --headless $(DEMO_ARGS)
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -n 2 $(TEST_ARGS)
+	$(BIN)/python -m pytest -n 4 --dist worksteal $(TEST_ARGS)
 
 check: $(STAMP)
 	$(BIN)/ruff format --check .
