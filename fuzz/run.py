@@ -33,6 +33,7 @@ def main() -> None:
     work = Path(tempfile.mkdtemp(prefix="firstfix-seeds-"))
     for i, data in enumerate(seeds(name, work)):
         (corpus / f"seed{i}").write_bytes(data)
+        try_one(name, data)  # compiles kernels before a clock runs
     kept = Path(__file__).parent / "inputs" / name
     folders = [str(corpus), *([str(kept)] if kept.is_dir() else [])]
     limits = ["-timeout=20", "-rss_limit_mb=3000", "-max_len=20000"]
