@@ -86,8 +86,8 @@ def _sections(figures: Row) -> list[str]:
             f"A simulated Kobuki in the built-in `{settings['world']}`, over a real roscore; "
             f"`firstfix serve --robot ros1` in mode `{settings['mode']}`; a viewer of its page. "
             f"Right: within {RIGHT_M:g} m and {RIGHT_DEG:g} degrees at the stamp of the scan. "
-            "Stale: somebody has just moved the robot, and the pose goes on from the last right one "
-            f"by odometry, for {STALE_S:g} s at most. Wrong: anything else."
+            "Stale: somebody has just moved the robot, and the pose goes on from the last right "
+            f"one by odometry, for {STALE_S:g} s at most. Wrong: anything else."
         ),
         "![memory, lag and faults over time](soak.png)",
         "## Poses",

@@ -227,6 +227,20 @@ def test_a_clock_set_back_is_a_reset_then_odometry(known, robot):
     assert kinds(known.take(Heard.SCAN, robot.scan())) == [LaserScan]
 
 
+def test_a_clock_set_back_by_less_than_a_second_costs_one_scan_and_mixes_nothing(known, robot):
+    T_odom_base = robot.T_odom_base
+    assert kinds(known.take(Heard.SCAN, robot.scan())) == [LaserScan]
+    robot.stamp, robot.T_odom_base = 99.4, T_odom_base @ SE2(0.2, 0.0, 0.5)
+    assert known.take(Heard.TF, robot.tf()) == []  # it might have been overtaken
+    assert known.take(Heard.SCAN, robot.scan()) == []
+    assert "1 scans left out so far; the clock was set back: scans by 0.60 s" in known.last
+    robot.stamp = 99.42
+    (told,) = known.take(Heard.TF, robot.tf())
+    assert told.stamp == 99.42
+    assert told.T_odom_base.distance_to(robot.T_odom_base) < 1e-9
+    assert kinds(known.take(Heard.SCAN, robot.scan())) == [LaserScan]
+
+
 def test_scans_that_wait_when_the_clock_is_set_back_are_left_behind(ear, turret):
     ear.take(Heard.TF, turret.mast(99.9))
     ear.take(Heard.TF, turret.tf())

@@ -128,6 +128,44 @@ def test_a_second_is_no_clock_set_back(frames):
     assert frames.odometry_at(100.0) != []
 
 
+def test_a_clock_set_back_a_little_is_told_by_scans_and_odometry_together(frames):
+    frames.fix([link("base", "laser", x=0.2)])
+    for stamp in (100.0, 100.1, 100.2):
+        frames.move([driven(stamp)])
+        frames.news()
+        assert frames.set_back_at_scan(stamp) == 0.0
+    # The clock was set back by 0.15 s, the robot drives on.
+    assert frames.move([link("odom", "base", 100.12, 100.27)]) == 0.0
+    assert told(frames) == []
+    assert frames.set_back_at_scan(100.12) == pytest.approx(0.08)
+    assert (frames.told_until, frames.odometry_at(100.1)) == (-math.inf, [])
+    frames.move([link("odom", "base", 100.14, 100.29)])
+    assert told(frames) == [(100.14, 100.29)]
+    assert frames.laser_at("laser", 100.14).T_base_laser == SE2(0.2, 0.0, 0.0)
+    assert frames.set_back_at_scan(100.14) == 0.0
+    assert frames.odometry_at(100.2) == []
+
+
+@pytest.mark.parametrize("older", [100.1, 100.16, 100.3])
+def test_one_of_two_lasers_that_is_late_does_not_set_the_clock_back(frames, older):
+    for i in range(5):
+        frames.move([driven(100.2 + 0.1 * i)])
+        frames.news()
+        assert frames.set_back_at_scan(100.2 + 0.1 * i) == 0.0
+        assert frames.set_back_at_scan(older - 0.1 + 0.1 * i) == 0.0
+    assert frames.odometry_at(100.3) != []
+
+
+def test_odometry_that_was_overtaken_does_not_set_the_clock_back(frames):
+    frames.move([driven(100.0)])
+    frames.move([driven(100.4)])
+    frames.news()
+    frames.set_back_at_scan(100.3)
+    frames.move([driven(100.2)])
+    assert frames.set_back_at_scan(100.4) == 0.0
+    assert frames.odometry_at(100.1) != []
+
+
 def test_only_odometry_tells_the_time(frames):
     """AMCL dates its transforms ahead, and another robot's clock is no concern of this one."""
     frames.move([driven(100.0), driven(105.0, "map", "odom"), driven(100.0, "base", "camera")])

@@ -29,7 +29,6 @@ from firstfix.system.inputs import Input, NewMap, NoMotionUpdate, PoseHint, Rese
 
 # Odometry that lags more than this behind the scans comes from another clock, s.
 _LAG_S = 1.0
-
 # Scans that wait for the transform of a sensor that moves on its robot.
 _MOST_WAITING = 40
 
@@ -127,6 +126,8 @@ class Intake:
         stamp, frame = to_seconds(message.header.stamp), to_frame(message.header.frame_id)
         if stamp <= 0.0:
             return self._leave_out("a scan has no stamp: its driver must write one")
+        if (back_s := self._frames.set_back_at_scan(stamp)) > 0.0:
+            return self._leave_out(f"the clock was set back: scans by {back_s:.2f} s")
         reach = self._frames.reach
         if isinstance(reach, NotKnown):
             odom, base = self._config.odom_frame_id, self._config.base_frame_id

@@ -15,6 +15,8 @@ from firstfix.formats.transforms import flat
 
 # Messages may overtake each other by so much, s; more, and the clock was set back.
 _OVERTAKING_S = 1.0
+# Unless scans go back, too: what comes so much later than it should, s, was not overtaken then.
+_BEHIND_S = 0.05
 
 
 class RobotFrames:
@@ -34,6 +36,8 @@ class RobotFrames:
         self._topic = TransformBuffer()
         self._topic_child = base
         self._told_until = -math.inf
+        # Stamps of the last messages, the newest or not.
+        self._moved_at, self._scanned_at = math.inf, -math.inf
 
     @property
     def told_until(self) -> float:
@@ -99,6 +103,28 @@ class RobotFrames:
         self._topic.add(odometry._replace(child=self._topic_child))
         return back
 
+    def set_back_at_scan(self, stamp: float) -> float:
+        """Take note of a scan, and see whether the clock of the robot was set back a little.
+
+        One message may be overtaken by another; odometry and scans that both go back are not.
+
+        Parameters
+        ----------
+        stamp : float
+            Of the scan, s.
+
+        Returns
+        -------
+        float
+            By how much scans went back, s; 0 if the clock was not set back. If it was, what moved
+            before is forgotten: of two odometries of one time, nobody knows which is meant.
+        """
+        back, self._scanned_at = self._scanned_at - stamp, stamp
+        if back <= 0.0 or self._told_until - self._moved_at <= _BEHIND_S:
+            return 0.0
+        self._begin_anew()
+        return back
+
     def news(self) -> list[Odometry]:
         """Return the odometry that has become known since the last call: one message or none."""
         reach = self.reach
@@ -152,10 +178,14 @@ class RobotFrames:
 
     def _set_back(self, stamp: float) -> float:
         """Return by how much the clock was set back, s; if it was, forget what moved."""
+        self._moved_at = stamp
         back = self._told_until - stamp
         if back <= _OVERTAKING_S:
             return 0.0
+        self._begin_anew()
+        return back
+
+    def _begin_anew(self) -> None:
         self._tf.forget_moves()
         self._topic.forget_moves()
         self._told_until = -math.inf
-        return back
