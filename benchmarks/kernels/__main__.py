@@ -188,12 +188,15 @@ def as_text(document: dict[str, Any]) -> str:
         (row["name"], f"{1 / row['ns']:.3g}", f"{1 / row['best_ns']:.3g}")
         for row in document["limits"]
     ]
+    caches_and_map = (
+        f"Caches: {caches}. Map: {of_map['width']} x {of_map['height']} cells of "
+        f"{of_map['resolution']} m. Medians and best of {document['runs']} runs in turns."
+    )
     return "\n\n".join(
         [
             "# Kernels against the limits of the machine",
             machine_text(document["machine"]),
-            f"Caches: {caches}. Map: {of_map['width']} x {of_map['height']} cells of "
-            f"{of_map['resolution']} m. Medians and best of {document['runs']} runs in turns.",
+            caches_and_map,
             markdown_table(head, rows),
             "## What the machine can do, per nanosecond",
             markdown_table(("limit", "median", "best"), measured),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from firstfix.core.angles import FULL_TURN
 from firstfix.fields.raycast import _is_inside_cell, _towards
+from firstfix.sim.wavefront import _improve
 
 
 @njit
@@ -133,9 +134,7 @@ def pairs(
 
 
 def passes(weights: NDArray[np.float32], start: tuple[int, int]) -> int:
-    """Times that `_sweep_until_still` goes over the map, to and fro counting two."""
-    from firstfix.sim.wavefront import _improve
-
+    """Count how often `_sweep_until_still` goes over the map, to and fro being two."""
     costs = np.full(weights.shape, np.inf, np.float32)
     costs[start] = 0.0
     return _passes(_improve, weights, costs)

@@ -55,6 +55,6 @@ class Kernel:
 
 
 def name_of(function: Any) -> str:
-    """Module and function of a dispatcher, without the package."""
+    """Return module and function of a dispatcher, without the package."""
     module = str(function.py_func.__module__).removeprefix("firstfix.")
     return f"{module}.{function.py_func.__name__}"

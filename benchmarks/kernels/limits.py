@@ -104,9 +104,7 @@ def _read(size: int) -> Limit:
 def _copy(size: int) -> Limit:
     source, target = np.ones(size // 16, np.int64), np.ones(size // 16, np.int64)
     times = max(1, _AT_LEAST // size)
-    return Limit(
-        _name("bytes copied", size), size * times, lambda: _add_one(source, target, times)
-    )
+    return Limit(_name("bytes copied", size), size * times, lambda: _add_one(source, target, times))
 
 
 @cache
@@ -157,16 +155,22 @@ def operations(kind: str) -> Limit:
 
 @cache
 def chain() -> Limit:
-    """Steps that each wait for the last: a minimum and an addition of integers."""
+    """Take steps that each wait for the last: a minimum and an addition of integers."""
     values = np.arange(2048, dtype=np.int32)[::-1].copy()
     return Limit("chained min + add", values.size, lambda: _chained(values))
 
 
 @cache
 def sums() -> Limit:
-    """Steps that each wait for the last: an addition of float64."""
+    """Take steps that each wait for the last: an addition of float64."""
     values = np.ones(2048)
     return Limit("chained f64 additions", values.size, lambda: _chained_sum(values))
+
+
+@cache
+def leaps() -> Limit:
+    """Find the next cell of a ray, without a map: arithmetic that waits for the last."""
+    return Limit("leaps without a map", 20_000, lambda: _leap(20_000, 3.3, 0.7, 1.4))
 
 
 @cache
@@ -296,6 +300,15 @@ def _chained(values: NDArray[np.int32]) -> int:
     for i in range(values.size):
         beside = min(int(values[i]), beside + 1)
     return beside
+
+
+@njit
+def _leap(steps: int, start: float, slope: float, per: float) -> int:
+    column = 0
+    for _ in range(steps):
+        length = ((column & 15) + 1 - start) * per
+        column = math.floor(start + slope * length)
+    return column
 
 
 @njit

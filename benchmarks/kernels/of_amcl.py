@@ -62,7 +62,7 @@ def _looked_up(
     return [
         Kernel(
             function=likelihood_field._sum_values,
-            parts=(),
+            parts=(likelihood_field._find_cells,),
             unit="beam of a particle",
             units=float(n * m),
             call=lambda: likelihood_field._sum_values(*poses, *ends, table, *sensor._shape, sums),
@@ -101,18 +101,18 @@ def _cast(grid: OccupancyGrid, belief: Particles, beams: Beams, config: AmclConf
         np.sin(along).ravel(),
         np.full(along.size, reach),
     )
-    each, working_set = leaps / along.size, float(np.pi * reach**2)
+    each, mean_cells = leaps / along.size, float(beams.ranges.mean() / grid.resolution)
     return Kernel(
         function=ray_model._log_of_mixture,
         parts=(),
         unit="beam of a particle",
         units=float(along.size),
         call=lambda: model.log_likelihood(some, beams),
-        working_set=working_set,
+        working_set=(2.0 * mean_cells) ** 2,
         moved=24 + each,
         operations=LEAP_OPERATIONS * each + 15,
         roofs=leap_roofs(
-            working_set,
+            mean_cells,
             each,
             *((limits.calls(name), 1) for name in ("sin + cos", "exp", "log")),
         ),
@@ -201,9 +201,7 @@ def _clusters(belief: Particles) -> list[Kernel]:
             parts=(clusters._wrapped,),
             unit="particle",
             units=float(n),
-            call=lambda: clusters._moments(
-                *poses, belief.weight, belief.weight, label, count
-            ),
+            call=lambda: clusters._moments(*poses, belief.weight, belief.weight, label, count),
             working_set=40.0 * n,
             moved=48 + 40,
             operations=50,

@@ -84,6 +84,8 @@ def _distances(grid: OccupancyGrid, near: int) -> list[Kernel]:
             roofs={
                 "memory": ((limits.copy(3 * cells), 7),),
                 "arithmetic": ((limits.operations("u16"), 8 + 3.25 * rounds),),
+                # Of each column to compare with: two read, the best so far read and written.
+                "nearest cache": ((limits.copy(4096), 8 * rounds),),
             },
         ),
     ]
@@ -106,17 +108,18 @@ def _clearance(grid: OccupancyGrid) -> Kernel:
     out = np.empty(occupied.shape, np.uint8)
     return Kernel(
         function=clearance._sweep,
-        parts=(clearance._nearest_of_three,),
+        parts=(clearance._nearest_of_three, clearance._look_along, clearance._step_along),
         unit="cell",
         units=cells,
         call=lambda: clearance._sweep(occupied, out),
         working_set=2 * cells,
         moved=4,
-        operations=9,
+        operations=46,
         roofs={
             "memory": ((limits.copy(2 * cells), 4),),
-            "arithmetic": ((limits.operations("u8"), 4),),
-            "chain along a row": ((limits.chain(), 2),),
+            "arithmetic": ((limits.operations("u8"), 46),),
+            # Three neighbours to one twice; eight steps along the row, each of three to one.
+            "nearest cache": ((limits.copy(4096), 2 * 8 + 8 * 4 + 4),),
         },
     )
 
@@ -185,10 +188,16 @@ LEAP_OPERATIONS = 14
 """To both lines: 2 x (add, add, subtract, multiply); along: 2; floor, nearness: 3; a comparison."""
 
 
-def leap_roofs(working_set: float, leaps: float, *others: tuple[Any, float]) -> dict[str, Any]:
-    """What holds leaping rays back: a unit has so many leaps, and other things to do."""
+def leap_roofs(mean_cells: float, leaps: float, *others: tuple[Any, float]) -> dict[str, Any]:
+    """Tell what holds leaping rays back: a unit has so many leaps, and other things to do.
+
+    Of one ray, each leap waits for what the last has read. Only many rays at a time could be as
+    fast as the reads and the arithmetic alone.
+    """
+    around = (2.0 * mean_cells) ** 2
     return {
-        "looking up": ((limits.gather(working_set), leaps), *others),
+        "chain of leaps": ((limits.chase(around), leaps), (limits.leaps(), leaps), *others),
+        "looking up": ((limits.gather(around), leaps), *others),
         "arithmetic": ((limits.operations("f64"), LEAP_OPERATIONS * leaps), *others),
     }
 
@@ -204,15 +213,16 @@ def _table(fields: MapFields, rng: np.random.Generator) -> Kernel:
     each = np.repeat(x, n), np.repeat(y, n), np.tile(dx, count), np.tile(dy, count)
     reach = np.full(count * n, range_table.FARTHEST / per_cell)
     leaps = counts.leaps(fields.clearance, *each, reach)
-    working_set = float(fields.clearance.size)
+    range_table._fill(fields.clearance, x, y, dx, dy, per_cell, table)
+    mean_cells = float(table.mean()) / per_cell
     return Kernel(
         function=range_table._fill,
         parts=(raycast.cast_ray_leaping, raycast._is_inside_cell),
         unit="leap",
         units=leaps,
         call=lambda: range_table._fill(fields.clearance, x, y, dx, dy, per_cell, table),
-        working_set=working_set,
+        working_set=(2.0 * mean_cells) ** 2,
         moved=1 + 2 * count * n / leaps,
         operations=LEAP_OPERATIONS,
-        roofs=leap_roofs(working_set, 1.0),
+        roofs=leap_roofs(mean_cells, 1.0),
     )

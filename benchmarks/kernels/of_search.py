@@ -74,7 +74,10 @@ def _searched(fields: MapFields, queries: Any) -> list[Kernel]:
             operations=1,
             roofs={
                 "memory": of_endpoints,
-                "arithmetic": ((limits.operations("u8"), 11 / 12), (limits.operations("u16"), 1 / 12)),
+                "arithmetic": (
+                    (limits.operations("u8"), 11 / 12),
+                    (limits.operations("u16"), 1 / 12),
+                ),
             },
         ),
         Kernel(
@@ -87,7 +90,10 @@ def _searched(fields: MapFields, queries: Any) -> list[Kernel]:
             moved=1,
             operations=7,
             roofs={
-                "memory": ((limits.read(table.shape[1]), 1), (limits.read(table.nbytes), 2 / n_ranges)),
+                "memory": (
+                    (limits.read(table.shape[1]), 1),
+                    (limits.read(table.nbytes), 2 / n_ranges),
+                ),
                 "arithmetic": ((limits.operations("u8"), 7),),
             },
         ),
@@ -213,18 +219,18 @@ def _descend_rays(best: NDArray[np.float64], beams: Beams, fields: MapFields) ->
         call(refine._descend_rays.py_func)
     rounds = solved.call_count
     leaps = _leaps_at(best, hits, ranges + widths[1] + 2.0, fields) / (len(best) * len(hits))
-    working_set = float(np.pi * ranges.max() ** 2)
+    mean_cells = float(ranges.mean())
     return Kernel(
         function=refine._descend_rays,
         parts=(refine._normal,),
         unit="beam of a round",
         units=float(rounds * len(hits)),
         call=call,
-        working_set=working_set,
+        working_set=(2.0 * mean_cells) ** 2,
         moved=24 + leaps + 24,
         operations=LEAP_OPERATIONS * leaps + 85,
         roofs=leap_roofs(
-            working_set,
+            mean_cells,
             leaps,
             (limits.calls("exp"), 1),
             (limits.calls("division"), 5),
@@ -248,19 +254,17 @@ def _verify(refined: NDArray[np.float64], beams: Beams, fields: MapFields) -> Ke
     used, resolution = beams.thinned(verify.BEAMS), fields.grid.resolution
     reach = (used.ranges + np.where(used.hit, verify._SHORT_LIMIT_M, 0.0)) / resolution
     leaps = _leaps_at(refined, used, reach, fields) / (len(refined) * len(used))
-    working_set = float(np.pi * reach.max() ** 2)
+    mean_cells = float(reach.mean())
     return Kernel(
         function=verify._verify,
         parts=(),
         unit="beam at a pose",
         units=float(len(refined) * len(used)),
         call=lambda: verify._compared(refined, used, fields),
-        working_set=working_set,
+        working_set=(2.0 * mean_cells) ** 2,
         moved=41 + leaps + 7,
         operations=LEAP_OPERATIONS * leaps + 26,
-        roofs=leap_roofs(
-            working_set, leaps, (limits.calls("exp"), 1), (limits.calls("log"), 1)
-        ),
+        roofs=leap_roofs(mean_cells, leaps, (limits.calls("exp"), 1), (limits.calls("log"), 1)),
     )
 
 

@@ -28,21 +28,20 @@ def _swept(grid: OccupancyGrid, pose: SE2, rng: np.random.Generator) -> Kernel:
     x, y = np.full(BEAMS, start[0]), np.full(BEAMS, start[1])
     headings, reach = np.linspace(-np.pi, np.pi, BEAMS), 12.0 / grid.resolution
     circles = np.column_stack([start + rng.uniform(-60, 60, (PEOPLE, 2)), np.full(PEOPLE, 5.0)])
-    leaps = counts.leaps(
-        clearance, x, y, np.cos(headings), np.sin(headings), np.full(BEAMS, reach)
-    )
-    each, working_set = leaps / BEAMS, float(np.pi * reach**2)
+    leaps = counts.leaps(clearance, x, y, np.cos(headings), np.sin(headings), np.full(BEAMS, reach))
+    ranges = sweep._cast(clearance, x, y, headings, circles, reach)
+    each, mean_cells = leaps / BEAMS, float(np.minimum(ranges, reach).mean())
     return Kernel(
         function=sweep._cast,
         parts=(),
         unit="beam",
         units=float(BEAMS),
         call=lambda: sweep._cast(clearance, x, y, headings, circles, reach),
-        working_set=working_set,
+        working_set=(2.0 * mean_cells) ** 2,
         moved=32 + each,
         operations=14 * each + 12 * PEOPLE,
         roofs=leap_roofs(
-            working_set,
+            mean_cells,
             each,
             (limits.calls("sin + cos"), 1),
             (limits.operations("f64"), 12 * PEOPLE),

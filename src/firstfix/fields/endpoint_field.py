@@ -56,12 +56,19 @@ def build_endpoint_field(
 def _pool(squares: NDArray[np.uint16], table: NDArray[np.float32], side: int) -> NDArray[np.uint8]:
     height, width = squares.shape
     pooled = np.empty((-(-height // side), -(-width // side)), np.uint8)
+    totals = np.empty(width, np.float64)
     for row in range(pooled.shape[0]):
+        totals[:] = 0.0
+        first, end = row * side, min(height, (row + 1) * side)
+        for y in range(first, end):
+            line = squares[y]
+            for x in range(width):
+                totals[x] += table[line[x]]
         for column in range(pooled.shape[1]):
-            total, cells = 0.0, 0
-            for y in range(row * side, min(height, (row + 1) * side)):
-                for x in range(column * side, min(width, (column + 1) * side)):
-                    total += table[squares[y, x]]
-                    cells += 1
+            begin, beyond = column * side, min(width, (column + 1) * side)
+            total = 0.0
+            for x in range(begin, beyond):
+                total += totals[x]
+            cells = (end - first) * (beyond - begin)
             pooled[row, column] = np.uint8(math.floor(total / cells + 0.5))
     return pooled

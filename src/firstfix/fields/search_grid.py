@@ -111,14 +111,23 @@ def _free_blocks(
 ) -> NDArray[np.bool_]:
     height, width = free.shape
     blocks = np.zeros((-(-height // stride), -(-width // stride)), np.bool_)
+    counts = np.empty(width, np.int32)
     for row in range(blocks.shape[0]):
+        y = row * stride + stride // 2
+        if y >= height:
+            continue
+        centres, walls, block = free[y], occupied[y], blocks[row]
+        counts[:] = 0
+        for y in range(row * stride, min(height, (row + 1) * stride)):
+            line = free[y]
+            for x in range(width):
+                counts[x] += np.int32(line[x])
         for column in range(blocks.shape[1]):
-            y, x = row * stride + stride // 2, column * stride + stride // 2
-            if y >= height or x >= width or occupied[y, x]:
+            x = column * stride + stride // 2
+            if x >= width or walls[x]:
                 continue
-            count = stride * stride if free[y, x] else 0
-            for y in range(row * stride, min(height, (row + 1) * stride)):
-                for x in range(column * stride, min(width, (column + 1) * stride)):
-                    count += free[y, x]
-            blocks[row, column] = 2 * count >= stride * stride
+            count = stride * stride if centres[x] else 0
+            for x in range(column * stride, min(width, (column + 1) * stride)):
+                count += counts[x]
+            block[column] = 2 * count >= stride * stride
     return blocks

@@ -58,7 +58,9 @@ def _suppress(
             break
         taken = False
         for j in kept[:n]:
-            turn = abs(poses[i, 2] - poses[j, 2]) % FULL_TURN
+            turn = abs(poses[i, 2] - poses[j, 2])
+            if turn >= FULL_TURN:  # hardly ever, and a remainder takes as long as all the rest
+                turn %= FULL_TURN
             if min(turn, FULL_TURN - turn) <= near_rad:
                 dx, dy = poses[i, 0] - poses[j, 0], poses[i, 1] - poses[j, 1]
                 if dx * dx + dy * dy <= near_cells * near_cells:
