@@ -56,7 +56,7 @@ def build_endpoint_field(
 def _pool(squares: NDArray[np.uint16], table: NDArray[np.float32], side: int) -> NDArray[np.uint8]:
     height, width = squares.shape
     pooled = np.empty((-(-height // side), -(-width // side)), np.uint8)
-    totals = np.empty(width, np.float64)
+    totals, sums = np.empty(width, np.float64), np.empty(pooled.shape[1], np.float64)
     for row in range(pooled.shape[0]):
         totals[:] = 0.0
         first, end = row * side, min(height, (row + 1) * side)
@@ -64,11 +64,14 @@ def _pool(squares: NDArray[np.uint16], table: NDArray[np.float32], side: int) ->
             line = squares[y]
             for x in range(width):
                 totals[x] += table[line[x]]
-        for column in range(pooled.shape[1]):
-            begin, beyond = column * side, min(width, (column + 1) * side)
-            total = 0.0
-            for x in range(begin, beyond):
-                total += totals[x]
-            cells = (end - first) * (beyond - begin)
-            pooled[row, column] = np.uint8(math.floor(total / cells + 0.5))
+        sums[:] = 0.0
+        for step in range(side):
+            for column in range((width - step + side - 1) // side):
+                sums[column] += totals[column * side + step]
+        out, cells = pooled[row], np.float64((end - first) * side)
+        for column in range(width // side):
+            out[column] = np.uint8(np.int32(sums[column] / cells + 0.5))
+        if width % side > 0:
+            cells = np.float64((end - first) * (width % side))
+            out[width // side] = np.uint8(np.int32(sums[width // side] / cells + 0.5))
     return pooled

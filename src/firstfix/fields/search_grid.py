@@ -111,7 +111,7 @@ def _free_blocks(
 ) -> NDArray[np.bool_]:
     height, width = free.shape
     blocks = np.zeros((-(-height // stride), -(-width // stride)), np.bool_)
-    counts = np.empty(width, np.int32)
+    counts, sums = np.empty(width, np.int32), np.empty(blocks.shape[1], np.int32)
     for row in range(blocks.shape[0]):
         y = row * stride + stride // 2
         if y >= height:
@@ -122,12 +122,12 @@ def _free_blocks(
             line = free[y]
             for x in range(width):
                 counts[x] += np.int32(line[x])
-        for column in range(blocks.shape[1]):
+        sums[:] = 0
+        for step in range(stride):
+            for column in range((width - step + stride - 1) // stride):
+                sums[column] += counts[column * stride + step]
+        for column in range((width - stride // 2 + stride - 1) // stride):
             x = column * stride + stride // 2
-            if x >= width or walls[x]:
-                continue
-            count = stride * stride if centres[x] else 0
-            for x in range(column * stride, min(width, (column + 1) * stride)):
-                count += counts[x]
-            block[column] = 2 * count >= stride * stride
+            if not walls[x]:
+                block[column] = centres[x] or 2 * sums[column] >= stride * stride
     return blocks
