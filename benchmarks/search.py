@@ -1,11 +1,11 @@
-"""Time what is computed for every scan: the kernels of the search, refinement, verification.
+"""Time what is computed for every scan: the steps of `locate`, whole, and the paper's search.
 
 Prints one line a measurement: the median over the runs (and the fastest run), in ms of one core,
 and where it is counted the rate in G/s: thousand millions of byte operations a second. One byte
 operation is one beam at one pose, whatever it takes: an end point looked up and added, or a
-measured range compared with the expected one; of `_choose_headings`, one score compared. The rate
-of the whole search counts both kinds of beams at every free position, but the work is done for
-whole tiles, so it is lower where tiles are half empty.
+measured range compared with the expected one. The rate of the whole search counts both kinds of
+beams at every free position, but the work is done for whole tiles, so it is lower where tiles are
+half empty. The kernels within are measured by `benchmarks/kernels`.
 
 The scan is one of the case; for a map without scans one is simulated at a random place. Refinement
 and verification start from the places that the search finds, as `locate` does.
@@ -21,14 +21,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.fields.map_fields import MapFields, build_fields
 from firstfix.fields.range_table import DIRECTIONS
-from firstfix.fields.search_grid import TILE_COLUMNS, TILE_ROWS
 from firstfix.formats.map_server import load_map
 from firstfix.formats.recording import load_recording
 from firstfix.global_localization import exhaustive
@@ -61,7 +58,6 @@ def main() -> None:
         f"{path}: {len(fields.positions)} positions in {len(fields.positions.tile_rows)} tiles, "
         f"{len(beams)} beams, {arguments.runs} runs, median (fastest)"
     )
-    time_kernels(beams, fields, arguments.runs)
     time_steps(beams, fields, arguments.runs)
     show("locate", arguments.runs, lambda: locate(scan, fields, LocateConfig()))
     time_paper(beams, fields, arguments.runs)
@@ -72,33 +68,6 @@ def scan_of(path: Path, grid: OccupancyGrid, index: int) -> LaserScan:
         return load_recording(path / "scans.npz").scans[index]
     rng = np.random.default_rng(index)
     return Lidar().scan(grid, random_free_pose(grid, rng), rng)
-
-
-def time_kernels(beams: Beams, fields: MapFields, runs: int) -> None:
-    """Time each kernel alone, over all tiles, rows of tiles or positions of the map."""
-    positions, endpoints = fields.positions, fields.endpoints
-    queries = kernels._queries(beams, fields)
-    bases = endpoints.base(positions.tile_rows, positions.tile_columns)
-    ends = np.empty((TILE_ROWS, DIRECTIONS, TILE_COLUMNS), np.uint16)
-    terms = len(bases) * ends.size * queries.offsets.shape[1]
-    of_tiles = (endpoints.values, bases, endpoints.columns, queries.offsets, ends)
-    show("_add_endpoints", runs, lambda: _all_tiles(*of_tiles), terms)
-
-    narrow, wide = np.empty(DIRECTIONS, np.uint8), np.empty(DIRECTIONS, np.uint16)
-    terms = fields.ranges.shape[0] * DIRECTIONS * len(queries.directions)
-    of_scan = (queries.directions, queries.counts, queries.through, queries.short)
-    show("_add_ranges", runs, lambda: _all_positions(fields.ranges, *of_scan, narrow, wide), terms)
-
-    rows = len(bases) * TILE_ROWS
-    weights = queries.endpoint_weight, queries.range_weight
-    gaps = np.zeros((DIRECTIONS, TILE_COLUMNS), np.uint16)
-    words = np.empty((kernels.SECTORS, TILE_COLUMNS), np.int32)
-    show(
-        "_choose_headings",
-        runs,
-        lambda: _all_rows(rows, ends, gaps, *weights, words),
-        rows * gaps.size,
-    )
 
 
 def time_steps(beams: Beams, fields: MapFields, runs: int) -> None:
@@ -137,45 +106,6 @@ def show(what: str, runs: int, function: Callable[[], object], terms: int = 0) -
     middle = float(np.median(seconds))
     rate = f"{terms / middle * 1e-9:8.1f} G/s" if terms else ""
     print(f"{what:28} {middle * 1e3:8.2f} ms ({min(seconds) * 1e3:.2f}){rate}")
-
-
-@njit
-def _all_tiles(
-    counts: NDArray[np.uint8],
-    bases: NDArray[np.int64],
-    columns: int,
-    offsets: NDArray[np.int64],
-    ends: NDArray[np.uint16],
-) -> None:
-    for base in bases:
-        kernels._add_endpoints(counts, base, columns, offsets, ends)
-
-
-@njit
-def _all_positions(
-    table: NDArray[np.uint8],
-    directions: NDArray[np.int64],
-    measured: NDArray[np.uint8],
-    through: NDArray[np.uint8],
-    short: NDArray[np.uint8],
-    narrow: NDArray[np.uint8],
-    wide: NDArray[np.uint16],
-) -> None:
-    for k in range(table.shape[0]):
-        kernels._add_ranges(table[k], directions, measured, through, short, narrow, wide)
-
-
-@njit
-def _all_rows(
-    rows: int,
-    ends: NDArray[np.uint16],
-    gaps: NDArray[np.uint16],
-    endpoint_weight: np.int32,
-    range_weight: np.int32,
-    words: NDArray[np.int32],
-) -> None:
-    for row in range(rows):
-        kernels._choose_headings(ends[row % TILE_ROWS], gaps, endpoint_weight, range_weight, words)
 
 
 if __name__ == "__main__":

@@ -138,7 +138,8 @@ def _blocks(fields: MapFields) -> Kernel:
         operations=1,
         roofs={
             "memory": ((limits.read(2 * cells), 1 + 1 / stride**2),),
-            "arithmetic": ((limits.operations("u8"), 1),),
+            # Counts of a column are read and written for each of its cells, then read once.
+            "nearest cache": ((limits.copy(4 * grid.width), 8 + 12 / stride),),
         },
     )
 
@@ -160,6 +161,7 @@ def _pooled(fields: MapFields) -> Kernel:
         roofs={
             "memory": ((limits.read(2 * cells), 2 + 1 / side**2),),
             "looking up": ((limits.gather(table.nbytes), 1),),
+            "nearest cache": ((limits.copy(8 * squares.shape[1]), 18 + 24 / side),),
         },
     )
 

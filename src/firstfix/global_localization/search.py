@@ -208,7 +208,7 @@ def _best_places(best: NDArray[np.int32], fields: MapFields, shortlist: int) -> 
 
 # The kernels below are written for LLVM's vectoriser: inner loops over 32 or 128 bytes of fixed
 # length, sums that stay in uint8 as long as they cannot overflow (12 end points of at most 10, 24
-# ranges of at most 10), slices taken outside the loops. `benchmarks/search.py` times them.
+# ranges of at most 10), slices taken outside the loops. `benchmarks/kernels` times them.
 
 
 @njit(cache=True, nogil=True)
