@@ -2,8 +2,8 @@
 """Installs the wheel of dist/ for every Python there is, with lowest and highest dependencies.
 
 ``make release-matrix``. Pythons are those of the variable PYTHONS, or python3.10 to python3.13 on
-PATH. Each gets clean environments; in each .ci/smoke.py tries what a user would. Prints a table;
-the exit status is 1 if something did not work.
+PATH. Each gets clean environments; in each .ci/smoke.py tries what a user would. Prints a table
+(times are processor times of a whole process); the exit status is 1 if something did not work.
 """
 
 from __future__ import annotations
@@ -20,7 +20,17 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 NAMES = "python3.10 python3.11 python3.12 python3.13"
-HEAD = ("Python", "dependencies", "numpy", "numba", "MiB", "import ms", "cold s", "warm s", "ok")
+HEAD = (
+    "Python",
+    "dependencies",
+    "numpy",
+    "numba",
+    "MiB",
+    "import ms",
+    "first locate s",
+    "next s",
+    "ok",
+)
 
 
 def main() -> int:
