@@ -17,7 +17,7 @@ from firstfix.sim.wavefront import _improve
 def steps(
     occupied: NDArray[np.bool_], x: float, y: float, headings: NDArray[np.float64], reach: float
 ) -> int:
-    """Cells that `cast_rays` looks at."""
+    """Count the cells that `cast_rays` looks at."""
     height, width = occupied.shape
     total = 0
     for heading in headings:
@@ -48,7 +48,7 @@ def leaps(
     dy: NDArray[np.float64],
     reach: NDArray[np.float64],
 ) -> int:
-    """Cells that leaping rays look at, each from its own start."""
+    """Count the cells that leaping rays look at, each from its own start."""
     height, width = clearance.shape
     total = 0
     for i in range(dx.size):
@@ -84,7 +84,7 @@ def leaps(
 
 @njit
 def rounds_outward(near: NDArray[np.uint16], limit: int, chunk: int) -> float:
-    """Columns that `_look_outward` compares to each side, over all cells of one row."""
+    """Count the columns that `_look_outward` compares to each side, over all cells of one row."""
     width = near.size
     squares = near.astype(np.int64) ** 2
     total = 0
@@ -112,13 +112,14 @@ def pairs(
     near_cells: float,
     near_rad: float,
     most: int,
-) -> int:
-    """Pairs of poses that `_suppress` compares."""
+) -> tuple[int, int]:
+    """Count the poses that `_suppress` looks at, and the pairs that it compares."""
     kept = np.empty(most, np.int64)
-    n, total = 0, 0
+    n, poses_seen, total = 0, 0, 0
     for i in order:
         if n == most:
             break
+        poses_seen += 1
         taken = False
         for j in kept[:n]:
             total += 1
@@ -130,7 +131,7 @@ def pairs(
         if not taken:
             kept[n] = i
             n += 1
-    return total
+    return poses_seen, total
 
 
 def passes(weights: NDArray[np.float32], start: tuple[int, int]) -> int:

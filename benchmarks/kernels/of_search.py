@@ -273,16 +273,21 @@ def _suppress(fields: MapFields, hits: Beams) -> Kernel:
     order = np.argsort(scores, kind="stable")
     near = places.SEPARATION_M / fields.grid.resolution, places.SEPARATION_RAD
     most = exhaustive._HYPOTHESES
+    seen, compared = counts.pairs(tried, order, *near, most)
     return Kernel(
         function=places._suppress,
         parts=(),
         unit="pair of poses",
-        units=float(counts.pairs(tried, order, *near, most)),
+        units=float(compared),
         call=lambda: places._suppress(tried, order, *near, most),
-        working_set=24.0 * most,
-        moved=24,
+        working_set=float(tried.nbytes),
+        moved=32 * seen / compared,
         operations=11,
-        roofs={"arithmetic": ((limits.operations("f64"), 11),)},
+        roofs={
+            "arithmetic": ((limits.operations("f64"), 11),),
+            # The poses come in the order of their scores, from all over the map.
+            "looking up": ((limits.gather(tried.nbytes), 3 * seen / compared),),
+        },
     )
 
 
