@@ -198,7 +198,7 @@ def _clusters(belief: Particles) -> list[Kernel]:
         ),
         Kernel(
             function=clusters._moments,
-            parts=(clusters._wrapped,),
+            parts=(clusters._means, clusters._put, clusters._wrapped),
             unit="particle",
             units=float(n),
             call=lambda: clusters._moments(*poses, belief.weight, belief.weight, label, count),

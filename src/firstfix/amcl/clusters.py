@@ -144,36 +144,31 @@ def _moments(
     """Sum up mass, mean pose and covariance of every group.
 
     Headings are averaged as turns against the first of the group, wrapped: a group is connected and
-    far narrower than a half turn, or means nothing. It saves two thirds of the time.
+    far narrower than a half turn, or means nothing. It saves two thirds of the time. And sums stay
+    out of memory as long as particles are of one group, as most are in tracking: another third.
     """
-    mass, shares = np.zeros(count), np.zeros(count)
-    first = np.full(count, -1, np.int64)
-    mean = np.zeros((count, 3))
-    for i in range(x.shape[0]):
-        k, w = label[i], emphasis[i]
-        if first[k] < 0:
-            first[k] = i
-        mass[k] += weight[i]
-        shares[k] += w
-        mean[k, 0] += w * (x[i] - x[first[k]])
-        mean[k, 1] += w * (y[i] - y[first[k]])
-        mean[k, 2] += w * _wrapped(yaw[i] - yaw[first[k]])
-    for k in range(count):
-        share = 1.0 / shares[k] if shares[k] > 0.0 else 0.0
-        mean[k, 0] = x[first[k]] + share * mean[k, 0]
-        mean[k, 1] = y[first[k]] + share * mean[k, 1]
-        mean[k, 2] = yaw[first[k]] + share * mean[k, 2]
+    mass, mean = _means(x, y, yaw, weight, emphasis, label, count)
     covariance = np.zeros((count, 3, 3))
+    k = -1
+    xx = xy = xt = yy = yt = tt = 0.0
     for i in range(x.shape[0]):
-        k, w = label[i], weight[i]
+        if label[i] != k:
+            if k >= 0:
+                _put(covariance[k], xx, xy, xt, yy, yt, tt)
+            k = label[i]
+            of = covariance[k]
+            xx, xy, xt, yy, yt, tt = of[0, 0], of[0, 1], of[0, 2], of[1, 1], of[1, 2], of[2, 2]
+        w = weight[i]
         dx, dy = x[i] - mean[k, 0], y[i] - mean[k, 1]
         turn = _wrapped(yaw[i] - mean[k, 2])
-        covariance[k, 0, 0] += w * dx * dx
-        covariance[k, 0, 1] += w * dx * dy
-        covariance[k, 0, 2] += w * dx * turn
-        covariance[k, 1, 1] += w * dy * dy
-        covariance[k, 1, 2] += w * dy * turn
-        covariance[k, 2, 2] += w * turn * turn
+        xx += w * dx * dx
+        xy += w * dx * dy
+        xt += w * dx * turn
+        yy += w * dy * dy
+        yt += w * dy * turn
+        tt += w * turn * turn
+    if k >= 0:
+        _put(covariance[k], xx, xy, xt, yy, yt, tt)
     for k in range(count):
         if mass[k] > 0.0:
             for a in range(3):
@@ -181,6 +176,65 @@ def _moments(
                     covariance[k, a, b] /= mass[k]
                     covariance[k, b, a] = covariance[k, a, b]
     return mass, mean, covariance
+
+
+@njit(cache=True, nogil=True)
+def _put(
+    covariance: NDArray[np.float64],
+    xx: float,
+    xy: float,
+    xt: float,
+    yy: float,
+    yt: float,
+    tt: float,
+) -> None:
+    covariance[0, 0], covariance[0, 1], covariance[0, 2] = xx, xy, xt
+    covariance[1, 1], covariance[1, 2], covariance[2, 2] = yy, yt, tt
+
+
+@njit(cache=True, nogil=True)
+def _means(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    yaw: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    emphasis: NDArray[np.float64],
+    label: NDArray[np.int64],
+    count: int,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mass and mean pose of every group."""
+    mass, shares = np.zeros(count), np.zeros(count)
+    first = np.full(count, -1, np.int64)
+    mean = np.zeros((count, 3))
+    k = -1
+    m = s = sum_x = sum_y = sum_yaw = 0.0
+    x0 = y0 = yaw0 = 0.0
+    for i in range(x.shape[0]):
+        if label[i] != k:
+            if k >= 0:
+                mass[k], shares[k] = m, s
+                mean[k, 0], mean[k, 1], mean[k, 2] = sum_x, sum_y, sum_yaw
+            k = label[i]
+            if first[k] < 0:
+                first[k] = i
+            m, s = mass[k], shares[k]
+            sum_x, sum_y, sum_yaw = mean[k, 0], mean[k, 1], mean[k, 2]
+            x0, y0, yaw0 = x[first[k]], y[first[k]], yaw[first[k]]
+        w = emphasis[i]
+        m += weight[i]
+        s += w
+        sum_x += w * (x[i] - x0)
+        sum_y += w * (y[i] - y0)
+        sum_yaw += w * _wrapped(yaw[i] - yaw0)
+    if k >= 0:
+        mass[k], shares[k] = m, s
+        mean[k, 0], mean[k, 1], mean[k, 2] = sum_x, sum_y, sum_yaw
+    for k in range(count):
+        share = 1.0 / shares[k] if shares[k] > 0.0 else 0.0
+        mean[k, 0] = x[first[k]] + share * mean[k, 0]
+        mean[k, 1] = y[first[k]] + share * mean[k, 1]
+        mean[k, 2] = yaw[first[k]] + share * mean[k, 2]
+    return mass, mean
 
 
 @njit(cache=True, nogil=True)
