@@ -104,6 +104,14 @@ def read_npz_member(data: bytes, folder: Path) -> None:
     load_recording(path, max_scans=50)
 
 
+def read_bag_message(data: bytes, folder: Path) -> None:
+    """Read a bag that is whole, with a message that is not: SQLite refuses most raw mutations."""
+    with Writer2(folder / "drive", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        store, kind = get_typestore(Stores.ROS2_HUMBLE), "sensor_msgs/msg/LaserScan"
+        writer.write(writer.add_connection("/scan", kind, typestore=store), 10**9, data)
+    load_recording(folder / "drive", max_scans=50)
+
+
 def read_parameters(data: bytes, folder: Path) -> None:
     """Read a parameter file of Nav2."""
     (folder / "nav2.yaml").write_bytes(data)
@@ -192,6 +200,7 @@ TARGETS: dict[str, Target] = {
     "bag1": _recording_of(".bag"),
     "bag2_db3": _recording_of(".db3"),
     "bag2_mcap": _recording_of(".mcap"),
+    "bag2_message": read_bag_message,
     "parameters": read_parameters,
     "saved_pose": read_saved_pose,
     "tum": read_tum,
@@ -230,6 +239,9 @@ def seeds(name: str, folder: Path) -> Iterator[bytes]:
         yield buffer.getvalue()
     elif name.startswith("carmen"):
         yield _CARMEN if name == "carmen" else gzip.compress(_CARMEN)
+    elif name == "bag2_message":
+        store = get_typestore(Stores.ROS2_HUMBLE)
+        yield bytes(store.serialize_cdr(_scan(store), "sensor_msgs/msg/LaserScan"))
     elif name.startswith("bag"):
         yield _bag(name, folder)
     elif name == "parameters":
