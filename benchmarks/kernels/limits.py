@@ -193,7 +193,7 @@ def surprises() -> Limit:
     """Branches that nobody could foretell; each costs what the processor threw away."""
     bits = np.random.default_rng(0).random(65536) < 0.5
     kept = np.empty(bits.size, np.int64)
-    return Limit("branches, half foretold", bits.size / 2, lambda: _keep(bits, kept))
+    return Limit("branches foretold wrong", bits.size / 2, lambda: _keep(bits, kept))
 
 
 # Nothing here is cached: a stale limit would judge for ever.

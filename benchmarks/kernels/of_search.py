@@ -272,7 +272,7 @@ def _suppress(fields: MapFields, hits: Beams) -> Kernel:
     tried, scores = exhaustive.pose_scores(hits, fields, exhaustive.FAST)
     order = np.argsort(scores, kind="stable")
     near = places.SEPARATION_M / fields.grid.resolution, places.SEPARATION_RAD
-    most = exhaustive._HYPOTHESES
+    most = SHORTLIST  # of the ten that the paper publishes, only the call would be seen
     seen, compared = counts.pairs(tried, order, *near, most)
     return Kernel(
         function=places._suppress,
