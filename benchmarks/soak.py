@@ -453,7 +453,12 @@ def main() -> None:
     parser.add_argument("--mode", choices=("full", "bootstrap"), default="full")
     parser.add_argument("--report", type=Path, help="folder; without it, print only")
     parser.add_argument("--keep", type=Path, help="folder for all that was written down meanwhile")
+    parser.add_argument("--judge", type=Path, help="judge the record.json of an earlier run again")
     options = parser.parse_args()
+    if options.judge is not None:
+        record = json.loads(options.judge.read_text(encoding="utf-8"))
+        print(write_report(judge(record), options.report))
+        return
     if (lacking := why_missing()) is not None:
         sys.exit(lacking)
     with contextlib.ExitStack() as stack:

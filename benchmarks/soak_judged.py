@@ -27,6 +27,10 @@ STALE_S = 5.0
 _STEP_M, _STEP_RAD = 0.35, math.radians(15.0)
 # Nothing of a fault is left so long after it, s.
 _SETTLED_S = 3.0
+# Scans that were sent so shortly before a fault, s, may be answered after it.
+_ON_THE_WAY_S = 0.5
+# A shorter life says nothing of how memory grows, s.
+_LONG_LIFE_S = 300.0
 _TOLERANCE_S = 1.0  # by which map -> odom is dated ahead
 _ORDER_S = 1.0  # within which a robot does as it is told
 
@@ -257,7 +261,7 @@ def calm(faults: list[Row], ended: float) -> list[tuple[float, float]]:
     for fault, after in zip(faults, [*faults[1:], None], strict=True):
         if fault["in_time"]:
             begin = fault["over"] + max(_SETTLED_S, fault["right_after_s"])
-            spans.append((begin, ended if after is None else after["begin"]))
+            spans.append((begin, (ended if after is None else after["begin"]) - _ON_THE_WAY_S))
     return [span for span in spans if span[1] > span[0]]
 
 
@@ -302,7 +306,7 @@ def lives(samples: list[Row], who: str, began: float) -> list[Row]:
         at, memory = np.array([(s["at"], s["rss_mb"]) for s in life]).T
         settled = at > at[0] + 60.0
         slope = None
-        if np.count_nonzero(settled) > 60:
+        if at[-1] - at[0] > _LONG_LIFE_S:
             slope = float(np.polyfit(at[settled] / 3600.0, memory[settled], 1)[0])
         found.append(
             {
@@ -374,6 +378,7 @@ def page(record: Row, truth: Truth, quiet: list[tuple[float, float]]) -> Row:
 
 
 _SAID = re.compile(r"\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[[\d.]+\]: (.*)")
+_FOLDERS = re.compile(r"(?<![\w:/])(/[\w.-]+)+/(?=[\w.-])")
 _COLOUR = re.compile(r"\x1b\[[\d;]*m")
 
 
@@ -381,7 +386,8 @@ def log(logs: list[list[str]]) -> list[Row]:
     """Count what processes said, but for what is only for information."""
     counted: Counter[tuple[str, str, str]] = Counter()
     for who, text in logs:
-        for line in _COLOUR.sub("", text).splitlines():
+        # Where this machine has its files is nobody's business.
+        for line in _FOLDERS.sub("", _COLOUR.sub("", text)).splitlines():
             found = _SAID.match(line.strip())
             level, said = found.groups() if found else ("", line.strip())
             if said and level not in ("DEBUG", "INFO"):
