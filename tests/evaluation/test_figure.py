@@ -24,13 +24,15 @@ def test_a_share_counts_what_is_not_known_and_what_is_off_the_axis() -> None:
 
 
 def test_a_png_has_a_palette_and_keeps_its_colours(tmp_path: Path) -> None:
-    figure = new_figure(2.0, 2.0)
+    figure = new_figure(6.0, 4.0)
     axes = figure.subplots()
     for i, colour in enumerate(PALETTE):
-        axes.bar(i, 1.0, color=colour)
-    with Image.open(save_figure(figure, tmp_path / "bars.png")) as image:
+        axes.scatter([i], [0.5], s=9, color=colour)
+    axes.imshow(np.random.default_rng(0).random((40, 60, 3)), extent=(0.0, 5.0, 1.0, 5.0))
+    axes.set_ylim(0.0, 5.0)
+    with Image.open(save_figure(figure, tmp_path / "points.png")) as image:
         assert image.mode == "P"
         pixels = np.asarray(image.convert("RGB")).reshape(-1, 3).astype(int)
-    for colour in PALETTE:
+    for colour in (*PALETTE, "#ffffff"):
         wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
-        assert np.abs(pixels - wanted).max(axis=1).min() <= 4
+        assert np.abs(pixels - wanted).max(axis=1).min() == 0

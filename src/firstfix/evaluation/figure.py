@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _DOTS_PER_INCH = 120
 _COLOURS = 128  # a dozen, and their blends where edges are smoothed
+_ALIKE = 8  # of 255: two colours that nobody tells apart
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
@@ -129,6 +130,10 @@ def save_figure(figure: Figure, path: Path) -> Path:
         If it cannot be written there.
     """
     check_path(path)
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        # Once more than when it is drawn: axes with a fixed aspect find their room only then.
+        engine.execute(figure)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.suffix.lower() == ".png":
@@ -146,9 +151,18 @@ def save_figure(figure: Figure, path: Path) -> Path:
 
 def _with_few_colours(figure: Figure) -> Image.Image:
     """Draw a figure with a palette: a third of the bytes, and reports are kept in repositories."""
-    from PIL import Image
+    from PIL import Image, ImageColor
 
     drawn = BytesIO()
     figure.savefig(drawn, format="png", dpi=_DOTS_PER_INCH)
     with Image.open(drawn) as image:
-        return image.convert("RGB").quantize(_COLOURS, dither=Image.Dither.NONE)
+        full = image.convert("RGB")
+    found = full.quantize(_COLOURS, dither=Image.Dither.NONE).getpalette() or []
+    # What few points have would be given the colour of others: ours are in it, come what may, and
+    # none beside them, between which Pillow would choose by chance.
+    own = np.array([ImageColor.getrgb(colour) for colour in (*PALETTE, "white", "black")])
+    others = np.reshape(found, (-1, 3))
+    apart = np.abs(others[:, None] - own).max(axis=2).min(axis=1) > _ALIKE
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(np.concatenate([own, others[apart]]).flatten().tolist())
+    return full.quantize(palette=palette, dither=Image.Dither.NONE)
