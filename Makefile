@@ -27,7 +27,7 @@ check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest -n 2 -q -m "not slow" $(TEST_ARGS)
+	$(BIN)/python -m pytest -n 3 --dist worksteal -q -m "not slow" $(TEST_ARGS)
 
 bench: $(STAMP)
 	$(BIN)/firstfix bench --suite paper --json out/paper.json --report out/paper

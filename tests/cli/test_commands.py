@@ -59,6 +59,7 @@ def test_bench_compares_with_the_truth_and_writes_it_down(cli, cases: Path, tmp_
     assert "| scans of " in ended.out
 
 
+@pytest.mark.slow
 def test_bench_takes_single_cases_and_a_limit(cli, cases: Path, tmp_path: Path) -> None:
     ended = cli("bench", cases / "unique", "--limit", 1, "--foreign", "--json", "b.json")
     assert ended.status == 0
@@ -171,6 +172,7 @@ def test_the_demo_tells_a_story_that_ends_well(cli, tmp_path: Path) -> None:
     assert (tmp_path / "firstfix-demo.png").stat().st_size > 5000
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("short_story")
 def test_the_demo_says_so_where_nobody_can_know(cli) -> None:
     ended = cli("demo", "--world", "rooms", "--headless", "--seed", 3)

@@ -302,6 +302,7 @@ def test_a_search_needs_no_start(cli, files: tuple[Path, Path]) -> None:
     assert len(load_tum(Path("found.tum"))) == document["scans"]
 
 
+@pytest.mark.slow
 def test_a_search_that_finds_nothing_says_why(
     cli, files: tuple[Path, Path], alike: tuple[Path, Path]
 ) -> None:

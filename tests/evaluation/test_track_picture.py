@@ -36,6 +36,7 @@ def test_a_track_becomes_a_picture(
         assert np.ptp(np.asarray(Image.open(path).convert("L"))) > 100
 
 
+@pytest.mark.slow
 def test_one_blind_scan_without_truth_is_a_picture_too(
     tmp_path: Path, hall_plan: OccupancyGrid, tracked: list[TrackedScan]
 ) -> None:

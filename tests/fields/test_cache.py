@@ -328,6 +328,7 @@ assert 1 <= len(calls) < 60
 """
 
 
+@pytest.mark.slow
 def test_processes_share_a_folder(tmp_path):
     processes = [
         subprocess.Popen([sys.executable, "-c", HAMMER, str(tmp_path), str(seed)])

@@ -286,6 +286,7 @@ VALUES = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(changes=st.dictionaries(st.sampled_from(list(GOOD)) | st.text(max_size=5), VALUES))
 def test_any_values_in_the_yaml(folder, changes):
