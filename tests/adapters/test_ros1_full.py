@@ -16,7 +16,7 @@ from firstfix.sim.world import WORLDS
 
 pytestmark = pytest.mark.slow
 
-DRIVE_S = 60.0
+DRIVE_S = 30.0
 
 
 def test_a_drive_is_followed_at_the_rate_of_the_scans(ros1: Lab) -> None:

@@ -83,8 +83,14 @@ def number_plainly(axis: Axis) -> None:
     """Put plain numbers on a logarithmic axis, between the decades too if there are few."""
     from matplotlib.ticker import LogFormatter
 
-    axis.set_major_formatter(LogFormatter())
-    axis.set_minor_formatter(LogFormatter(labelOnlyBase=False, minor_thresholds=(2.0, 0.5)))
+    class Plain(LogFormatter):
+        """Numbers where matplotlib wants one, but 0.1 instead of 1e-01."""
+
+        def __call__(self, x: float, pos: int | None = None) -> str:
+            return f"{x:g}" if super().__call__(x, pos) else ""
+
+    axis.set_major_formatter(Plain())
+    axis.set_minor_formatter(Plain(labelOnlyBase=False, minor_thresholds=(2.0, 0.5)))
 
 
 def can_draw() -> bool:
