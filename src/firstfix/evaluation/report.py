@@ -97,6 +97,7 @@ def save_times(runs: Sequence[CaseRun], path: Path) -> Path:
     """Plot processor time of a scan, median and 95th percentile, against the free area."""
     figure = new_figure(9.0, 6.0)
     axes = figure.subplots()
+    lowest: dict[str, tuple[float, float]] = {}
     for method, colour, marker in zip(_methods(runs), PALETTE, "osD^v*", strict=False):
         own = [run for run in runs if run.method is method]
         area = np.array([run.free_area_m2 for run in own])
@@ -105,14 +106,12 @@ def save_times(runs: Sequence[CaseRun], path: Path) -> Path:
         axes.vlines(area, median, most, color=colour, alpha=0.5, lw=1.5)
         axes.scatter(area, median, color=colour, marker=marker, label=method.value, zorder=3)
         for run, y in zip(own, median, strict=True):
-            axes.annotate(
-                run.case,
-                (run.free_area_m2, y),
-                xytext=(4, -9),
-                textcoords="offset points",
-                fontsize=6,
-                color="0.35",
-            )
+            x, least = lowest.get(run.site, (run.free_area_m2, y))
+            lowest[run.site] = (x, min(least, y))
+    for site, point in lowest.items():  # the names of all cases of a building would hide each other
+        axes.annotate(
+            site, point, xytext=(4, -9), textcoords="offset points", fontsize=6, color="0.35"
+        )
     axes.set(xscale="log", yscale="log")
     axes.margins(0.12)
     number_plainly(axes.xaxis)
