@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 from bisect import bisect_left
 from collections import Counter, defaultdict
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from soak_processes import cpu, lives, log, memory_of_lives, parts, without_numbers
 
 from firstfix.core.angles import angle_error
 from firstfix.core.se2 import SE2
@@ -29,8 +29,6 @@ _STEP_M, _STEP_RAD = 0.35, math.radians(15.0)
 _SETTLED_S = 3.0
 # Scans that were sent so shortly before a fault, s, may be answered after it.
 _ON_THE_WAY_S = 0.5
-# A shorter life says nothing of how memory grows, s.
-_LONG_LIFE_S = 300.0
 _TOLERANCE_S = 1.0  # by which map -> odom is dated ahead
 _ORDER_S = 1.0  # within which a robot does as it is told
 
@@ -295,63 +293,6 @@ def spread(values: Iterable[float | None]) -> Row | None:
     return {"n": len(known), "median": median, "p99": p99, "max": max(known)}
 
 
-def lives(samples: list[Row], who: str, began: float) -> list[Row]:
-    """Return what became of memory, threads and files in each life of a process, in its order."""
-    grouped: dict[int, list[Row]] = defaultdict(list)
-    for sample in samples:
-        if sample["who"] == who:
-            grouped[sample["pid"]].append(sample)
-    found = []
-    for life in grouped.values():
-        at, memory = np.array([(s["at"], s["rss_mb"]) for s in life]).T
-        settled = at > at[0] + 60.0
-        slope = None
-        if at[-1] - at[0] > _LONG_LIFE_S:
-            slope = float(np.polyfit(at[settled] / 3600.0, memory[settled], 1)[0])
-        found.append(
-            {
-                "from_s": float(at[0] - began),
-                "seconds": float(at[-1] - at[0]),
-                "mb_after_a_minute": float(memory[settled][0]) if settled.any() else None,
-                "mb_at_the_end": float(memory[-1]),
-                "mb_most": float(memory.max()),
-                "mb_an_hour": slope,
-                "threads_most": max(s["threads"] for s in life),
-                "threads_at_the_end": life[-1]["threads"],
-                "files_most": max(s["files"] for s in life),
-                "files_at_the_end": life[-1]["files"],
-            }
-        )
-    return found
-
-
-def memory_of_lives(samples: list[Row], began: float) -> list[list[tuple[float, float]]]:
-    """Return time and memory of the node, a list for each of its lives."""
-    grouped: dict[int, list[tuple[float, float]]] = defaultdict(list)
-    for sample in samples:
-        if sample["who"] == "node":
-            grouped[sample["pid"]].append((sample["at"] - began, sample["rss_mb"]))
-    return list(grouped.values())
-
-
-def parts(samples: list[Row]) -> list[Row]:
-    """Return the processor that each process took, as a share of a core, and its memory."""
-    found = []
-    for who in sorted({sample["who"] for sample in samples}):
-        own = [sample for sample in samples if sample["who"] == who]
-        found.append({"who": who, "cpu": cpu(own), "mb_most": max(s["rss_mb"] for s in own)})
-    return found
-
-
-def cpu(samples: list[Row]) -> float:
-    """Return the processor time of successive lives as a share of a core."""
-    used = passed = 0.0
-    for a, b in itertools.pairwise(samples):
-        if a["pid"] == b["pid"]:
-            used, passed = used + b["cpu_s"] - a["cpu_s"], passed + b["at"] - a["at"]
-    return used / passed if passed else 0.0
-
-
 def page(record: Row, truth: Truth, quiet: list[tuple[float, float]]) -> Row:
     """Say what a viewer of the page got, and what it missed."""
     seen = [row for row in record["seen"] if row["at"] >= record["began"]]
@@ -375,35 +316,6 @@ def page(record: Row, truth: Truth, quiet: list[tuple[float, float]]) -> Row:
             Counter(without_numbers(r["text"]) for r in seen if r["what"] == "complaint")
         ),
     }
-
-
-_SAID = re.compile(r"\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[[\d.]+\]: (.*)")
-_FOLDERS = re.compile(r"(?<![\w:/])(/[\w.-]+)+/(?=[\w.-])")
-_COLOUR = re.compile(r"\x1b\[[\d;]*m")
-
-
-def log(logs: list[list[str]]) -> list[Row]:
-    """Count what processes said, but for what is only for information."""
-    counted: Counter[tuple[str, str, str]] = Counter()
-    for who, text in logs:
-        # Where this machine has its files is nobody's business.
-        for line in _FOLDERS.sub("", _COLOUR.sub("", text)).splitlines():
-            found = _SAID.match(line.strip())
-            level, said = found.groups() if found else ("", line.strip())
-            if said and level not in ("DEBUG", "INFO"):
-                counted[who, level, without_numbers(said)[:160]] += 1
-    return [
-        {"who": who, "level": level, "text": text, "n": n}
-        for (who, level, text), n in sorted(
-            counted.items(), key=lambda item: (item[0][0], -item[1])
-        )
-        if who != "roscore"
-    ]
-
-
-def without_numbers(text: str) -> str:
-    """Let sentences be the same that differ in a number only."""
-    return re.sub(r"\d+(\.\d+)?(e[+-]?\d+)?", "N", text)
 
 
 def minutes(record: Row, truth: Truth, main: Judged) -> list[Row]:

@@ -144,13 +144,8 @@ def operations(kind: str) -> Limit:
     if kind in ("f32", "f64"):
         floats = {"f32": np.float32, "f64": np.float64}[kind]
         return _arithmetic(f"{kind} operations", floats, _multiply_add)
-    of_kind = {
-        "u8": (np.uint8, _add_min_u8),
-        "u16": (np.uint16, _add_min_u16),
-        "i32": (np.int32, _add_min_i32),
-        "i64": (np.int64, _add_min_i64),
-    }
-    return _arithmetic(f"{kind} operations", *of_kind[kind])
+    integers = {"u8": np.uint8, "u16": np.uint16, "i32": np.int32, "i64": np.int64}[kind]
+    return _arithmetic(f"{kind} operations", integers, _add_min(integers))
 
 
 @cache
@@ -254,44 +249,19 @@ def _multiply_add(values: NDArray[np.float64], factor: float, summand: float) ->
             values[i] = x
 
 
-@njit
-def _add_min_u8(values: NDArray[np.uint8], most: np.uint8, summand: np.uint8) -> None:
-    for _ in range(_TIMES):
-        for i in range(values.size):
-            x = values[i]
-            for _ in range(4):
-                x = np.uint8(min(x, most) + summand)
-            values[i] = x
+def _add_min(kind: type[np.integer]) -> Callable[..., None]:
+    """Make a kernel for whole numbers of a type, all of whose sums are of that type, too."""
 
+    @njit
+    def add_min(values: NDArray[np.integer], most: np.integer, summand: np.integer) -> None:
+        for _ in range(_TIMES):
+            for i in range(values.size):
+                x = values[i]
+                for _ in range(4):
+                    x = kind(min(x, most) + summand)
+                values[i] = x
 
-@njit
-def _add_min_u16(values: NDArray[np.uint16], most: np.uint16, summand: np.uint16) -> None:
-    for _ in range(_TIMES):
-        for i in range(values.size):
-            x = values[i]
-            for _ in range(4):
-                x = np.uint16(min(x, most) + summand)
-            values[i] = x
-
-
-@njit
-def _add_min_i32(values: NDArray[np.int32], most: np.int32, summand: np.int32) -> None:
-    for _ in range(_TIMES):
-        for i in range(values.size):
-            x = values[i]
-            for _ in range(4):
-                x = np.int32(min(x, most) + summand)
-            values[i] = x
-
-
-@njit
-def _add_min_i64(values: NDArray[np.int64], most: np.int64, summand: np.int64) -> None:
-    for _ in range(_TIMES):
-        for i in range(values.size):
-            x = values[i]
-            for _ in range(4):
-                x = min(x, most) + summand
-            values[i] = x
+    return add_min
 
 
 @njit
