@@ -19,9 +19,9 @@ WHERE = (2.0, 2.0, 0.5)
 MAKE = f"""
 import numpy as np
 import firstfix as ff
-from firstfix.formats.npz_writer import save_npz
-from firstfix.sim.lidar import Lidar
-from firstfix.sim.world import identical_rooms
+from firstfix.io.logs.npz_writer import save_npz
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import identical_rooms
 
 grid = identical_rooms(1)
 ff.save_map(grid, "map.yaml")
@@ -75,7 +75,7 @@ def main() -> None:
 
     doctor = said(PROGRAM, "doctor")
     assert "ready after" in doctor
-    said(sys.executable, "-c", "import firstfix.adapters.web.server")
+    said(sys.executable, "-c", "import firstfix.web.server")
     said(PROGRAM, "demo", "--headless")
     figures = {"import_ms": 1e3 * import_s, "cold_s": cold_s, "warm_s": warm_s}
     for package in ("numpy", "numba"):

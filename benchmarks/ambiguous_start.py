@@ -23,16 +23,16 @@ from firstfix.amcl.filter import start
 from firstfix.amcl.initial import around_hypotheses, around_pose, over_free_space
 from firstfix.amcl.particles import Particles
 from firstfix.amcl.sensor import build_sensor
-from firstfix.amcl.track import Track, Tracker
+from firstfix.amcl.tracker import Track, Tracker
 from firstfix.core.estimate import Hypothesis, Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.evaluation.drive import Sight, plan_drive
-from firstfix.evaluation.outcome import is_found
-from firstfix.evaluation.track import TRUE_START
-from firstfix.formats.map_server import load_map
-from firstfix.formats.recording import load_recording
-from firstfix.global_localization.locate import Locator
+from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.io.logs.load import load_recording
+from firstfix.io.maps.map_server import load_map
+from firstfix.lab.experiments.drive import Sight, plan_drive
+from firstfix.lab.experiments.drive_tracking import TRUE_START
+from firstfix.lab.metrics.outcome import is_found
 
 WAY_M = 5.0
 CONFIG = AmclConfig()
@@ -62,14 +62,14 @@ def tried(folder: Path, arguments: argparse.Namespace) -> list[int]:
     grid = load_map(folder / "map.yaml")
     sights = plan_drive(load_recording(folder / "scans.npz"), None).sights
     sights = tuple(replace(s, scan=shortened(s.scan, arguments.reach)) for s in sights)
-    locator = Locator(grid)
+    matcher = ScanMatcher(grid)
     tracker = Tracker(build_sensor(grid, CONFIG), CONFIG, lambda _, n, __: np.empty((n, 3)))
     counts = [0, 0, 0, 0, 0]
     for i in range(0, len(sights), arguments.every):
         drive = next_metres(sights[i:])
         if not drive:
             continue
-        result = locator.locate(drive[0].scan)
+        result = matcher.locate(drive[0].scan)
         wanted = arguments.all or result.verdict is Verdict.AMBIGUOUS
         if not wanted or not any(
             is_found(place.pose, drive[0].truth) for place in result.hypotheses

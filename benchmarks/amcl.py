@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.amcl.beams import Beams, choose_beams
+from firstfix.amcl.beam_selection import Beams, choose_beams
 from firstfix.amcl.clusters import find_clusters
 from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.filter import start, step
@@ -34,8 +34,8 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.recording import Recording
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.formats.map_server import load_map
-from firstfix.formats.recording import load_recording
+from firstfix.io.logs.load import load_recording
+from firstfix.io.maps.map_server import load_map
 
 SIZES = ((500, 60), (2000, 60), (2000, 180), (5000, 60), (5000, 180), (100_000, 60))
 INCREMENT = SE2(0.25, 0.0, 0.03)

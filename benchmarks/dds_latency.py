@@ -25,10 +25,15 @@ from typing import Any
 import numpy as np
 from cyclonedds.domain import Domain, DomainParticipant
 
-from firstfix.adapters.dds_ends import Receiver, Sender, Watch
-from firstfix.adapters.dds_types import decode, make
-from firstfix.adapters.ros_names import Names
-from firstfix.adapters.topics import (
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.io.maps.map_server import load_map
+from firstfix.io.ros_messages.incoming import to_seconds
+from firstfix.io.ros_messages.outgoing import laser_scan, occupancy_grid, transforms
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import WORLDS, random_free_pose
+from firstfix.ros.channels import (
     AMCL_POSE,
     INITIAL_POSE,
     TF,
@@ -37,15 +42,10 @@ from firstfix.adapters.topics import (
     Topic,
     heard_topics,
 )
-from firstfix.core.grid import OccupancyGrid
-from firstfix.core.scan import LaserScan
-from firstfix.core.se2 import SE2
-from firstfix.formats.map_server import load_map
-from firstfix.formats.messages import to_seconds
-from firstfix.formats.outgoing import laser_scan, occupancy_grid, transforms
-from firstfix.sim.lidar import Lidar
-from firstfix.sim.world import WORLDS, random_free_pose
-from firstfix.system.node_config import NodeConfig
+from firstfix.ros.dds.endpoints import Receiver, Sender, Watch
+from firstfix.ros.dds.types import decode, make
+from firstfix.ros.names import Names
+from firstfix.ros.node_config import NodeConfig
 
 LOOPBACK = (
     "<General><Interfaces><NetworkInterface name='lo'/></Interfaces>"

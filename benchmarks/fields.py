@@ -22,7 +22,7 @@ from firstfix.fields.endpoint_field import build_endpoint_field
 from firstfix.fields.map_fields import build_fields
 from firstfix.fields.range_table import build_range_table
 from firstfix.fields.search_grid import build_search_grid
-from firstfix.formats.map_server import load_map
+from firstfix.io.maps.map_server import load_map
 
 REACH_M = 25.0
 

@@ -23,16 +23,16 @@ from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.filter import Injection
 from firstfix.amcl.initial import around_pose, free_poses, hypothesis_poses
 from firstfix.amcl.sensor import Sensor, build_sensor
-from firstfix.amcl.track import Tracker
+from firstfix.amcl.tracker import Tracker
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.evaluation.drive import Sight, plan_drive
-from firstfix.evaluation.outcome import is_found
-from firstfix.evaluation.track import TRUE_START
-from firstfix.formats.map_server import load_map
-from firstfix.formats.recording import load_recording
-from firstfix.global_localization.locate import Locator
+from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.io.logs.load import load_recording
+from firstfix.io.maps.map_server import load_map
+from firstfix.lab.experiments.drive import Sight, plan_drive
+from firstfix.lab.experiments.drive_tracking import TRUE_START
+from firstfix.lab.metrics.outcome import is_found
 
 OFF = AmclConfig()
 ON = AmclConfig(recovery_alpha_slow=0.001, recovery_alpha_fast=0.1)
@@ -48,7 +48,7 @@ def main() -> None:
     for folder in arguments.folders:
         recording = load_recording(folder / "scans.npz")
         grid = load_map(folder / "map.yaml")
-        locator, sensor = Locator(grid), build_sensor(grid, OFF)
+        matcher, sensor = ScanMatcher(grid), build_sensor(grid, OFF)
 
         def anywhere(
             _: LaserScan, n: int, rng: np.random.Generator, grid: OccupancyGrid = grid
@@ -56,9 +56,9 @@ def main() -> None:
             return free_poses(grid, n, rng)
 
         def likely(
-            scan: LaserScan, n: int, rng: np.random.Generator, locator: Locator = locator
+            scan: LaserScan, n: int, rng: np.random.Generator, matcher: ScanMatcher = matcher
         ) -> NDArray[np.float64]:
-            return hypothesis_poses(locator.locate(scan).hypotheses, n, rng)
+            return hypothesis_poses(matcher.locate(scan).hypotheses, n, rng)
 
         sights = plan_drive(recording, None).sights
         cells = []

@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from firstfix.core.se2 import SE2
-from firstfix.formats.map_server import load_map
-from firstfix.formats.recording import load_recording
-from firstfix.global_localization.locate import Locator
-from firstfix.sim.world import random_free_poses
+from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.io.logs.load import load_recording
+from firstfix.io.maps.map_server import load_map
+from firstfix.lab.worlds.catalog import random_free_poses
 
 SLIP = SE2(0.5, 0.3, np.radians(20.0))
 
@@ -40,7 +40,7 @@ def judged(folder: Path, arguments: argparse.Namespace) -> list[str]:
     recording, grid = load_recording(folder / "scans.npz"), load_map(folder / "map.yaml")
     if recording.truth is None:
         return ["no truth"]
-    locator, rng = Locator(grid), np.random.default_rng(0)
+    matcher, rng = ScanMatcher(grid), np.random.default_rng(0)
     chosen = np.linspace(0, len(recording) - 1, min(arguments.scans, len(recording))).astype(int)
     wrong = random_free_poses(grid, rng, len(chosen))
     costs: list[list[float]] = [[], [], []]
@@ -48,13 +48,13 @@ def judged(folder: Path, arguments: argparse.Namespace) -> list[str]:
     for i, elsewhere in zip(chosen.tolist(), wrong, strict=True):
         scan, truth = recording.scans[i], SE2.from_array(recording.truth[i])
         began = time.process_time()
-        costs[0].append(locator.examine(scan, [truth])[0].score)
+        costs[0].append(matcher.examine(scan, [truth])[0].score)
         judging.append(time.process_time() - began)
-        costs[1].append(locator.examine(scan, [elsewhere])[0].score)
+        costs[1].append(matcher.examine(scan, [elsewhere])[0].score)
         began = time.process_time()
-        costs[2].append(locator.locate_near(scan, elsewhere).score)
+        costs[2].append(matcher.search_locally(scan, elsewhere).score)
         searching.append(time.process_time() - began)
-        slips.append(locator.locate_near(scan, truth @ SLIP).pose.distance_to(truth) < 0.3)
+        slips.append(matcher.search_locally(scan, truth @ SLIP).pose.distance_to(truth) < 0.3)
     return [
         *(" ".join(f"{x:.2f}" for x in np.percentile(cost, [5, 50, 97])) for cost in costs),
         f"{np.mean(slips):.0%}",

@@ -25,20 +25,20 @@ from typing import Any
 
 import numpy as np
 
-from firstfix.adapters.web.feed import Feed
-from firstfix.adapters.web.page import Page
-from firstfix.adapters.web.server import listen, make_server, url_of
-from firstfix.adapters.web.steering import Steering
 from firstfix.amcl.particles import equal_weights
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.global_localization.locate import Locator
-from firstfix.sim.lidar import Lidar
-from firstfix.sim.office import office
-from firstfix.sim.world import random_free_poses
-from firstfix.system.inputs import NewMap
-from firstfix.system.outputs import Status, TrackedPose
-from firstfix.system.transitions import State
+from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import random_free_poses
+from firstfix.lab.worlds.office import office
+from firstfix.localizer.inputs import NewMap
+from firstfix.localizer.outputs import Status, TrackedPose
+from firstfix.localizer.states import State
+from firstfix.web.feed import Feed
+from firstfix.web.page import Page
+from firstfix.web.server import listen, make_server, url_of
+from firstfix.web.steering import Steering
 
 BEAMS, PARTICLES, HZ = 720, 2000, 20
 LIDAR = Lidar(beams=BEAMS, dropout=0.01)
@@ -57,7 +57,7 @@ def serve(pipe: Connection) -> None:
     """Show frames until told to end; answer every word with CPU time and memory so far."""
     grid, placed = office(), scans(POSES)
     feed = Feed("office")
-    localizer: Any = SimpleNamespace(locator=Locator(grid), particles=None)
+    localizer: Any = SimpleNamespace(matcher=ScanMatcher(grid), particles=None)
     feed(NewMap(0.0, grid), [], localizer)
     is_over = threading.Event()
 
@@ -67,7 +67,7 @@ def serve(pipe: Connection) -> None:
             equal_weights(pose.as_array() + 0.1 * rng.standard_normal((PARTICLES, 3)))
             for pose, _ in placed
         ]
-        evidence = localizer.locator.examine(placed[0][1], [placed[0][0]])[0].evidence
+        evidence = localizer.matcher.examine(placed[0][1], [placed[0][0]])[0].evidence
         i = 0
         while not is_over.wait(1.0 / HZ):
             i += 1

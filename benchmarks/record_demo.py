@@ -31,7 +31,7 @@ WINDOW = {"width": 1152, "height": 648}
 PICTURE = (960, 540)
 FRAMES_A_SECOND = 6
 COLOURS = 64
-PAGE_COLOURS = Path("src/firstfix/adapters/web/static/light.css")
+PAGE_COLOURS = Path("src/firstfix/web/static/light.css")
 
 # The robot of this seed wakes up at (22.3, 0.9) m.
 DEMO = ("demo", "--world", "office", "--seed", "1", "--port", "0")
@@ -106,7 +106,7 @@ class Hand:
             const { x, y, width, height } = button.getBoundingClientRect();
             return [x + width / 2, y + height / 2];
         }"""
-        self._go(*self._page.locator(selector).evaluate(middle))
+        self._go(*self._page.matcher(selector).evaluate(middle))
         self._page.mouse.down()
         self._page.mouse.up()
 

@@ -32,14 +32,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "robots"))
 
 from ros1_lab import Lab, Program
 
-from firstfix.adapters.ros1_types import Empty, make, message_class
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.formats.map_server import load_map
-from firstfix.formats.messages import to_seconds
-from firstfix.formats.outgoing import laser_scan, occupancy_grid, transforms
-from firstfix.sim.lidar import Lidar
-from firstfix.sim.world import WORLDS, random_free_pose
+from firstfix.io.maps.map_server import load_map
+from firstfix.io.ros_messages.incoming import to_seconds
+from firstfix.io.ros_messages.outgoing import laser_scan, occupancy_grid, transforms
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import WORLDS, random_free_pose
+from firstfix.ros.ros1.types import Empty, make, message_class
 
 POSE = "geometry_msgs/PoseWithCovarianceStamped"
 SPEED_M_S, RADIUS_M, CLEARANCE_M = 0.5, 1.0, 1.5

@@ -26,17 +26,17 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.fields.map_fields import MapFields, build_fields
 from firstfix.fields.range_table import DIRECTIONS
-from firstfix.formats.map_server import load_map
-from firstfix.formats.recording import load_recording
 from firstfix.global_localization import exhaustive
 from firstfix.global_localization import search as kernels
 from firstfix.global_localization.beams import Beams, usable_beams
 from firstfix.global_localization.config import LocateConfig
-from firstfix.global_localization.locate import locate
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
+from firstfix.global_localization.scan_matcher import locate
 from firstfix.global_localization.verify import verify
-from firstfix.sim.lidar import Lidar
-from firstfix.sim.world import random_free_pose
+from firstfix.io.logs.load import load_recording
+from firstfix.io.maps.map_server import load_map
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import random_free_pose
 
 # As many places as `locate` refines on the field, and on rays.
 SHORTLIST = LocateConfig().shortlist

@@ -39,8 +39,8 @@ from soak_judged import judge
 from soak_report import write_report
 from soak_system import System, whole_lines
 
-from firstfix.evaluation.machine import this_machine
-from firstfix.sim.world import WORLDS
+from firstfix.lab.experiments.machine import this_machine
+from firstfix.lab.worlds.catalog import WORLDS
 
 SENSORS = ["scan", "/tf"]
 HOUR_S = 3600.0

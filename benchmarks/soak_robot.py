@@ -29,18 +29,18 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "robots"))
 import ros1_robot
 from play import BASE, LASER, report
 
-from firstfix.adapters.ros1_master import is_forgotten, register_anew
-from firstfix.adapters.ros1_types import make, message_class
 from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Odometry
 from firstfix.core.se2 import SE2
-from firstfix.formats.messages import to_seconds
-from firstfix.formats.outgoing import pose_with_covariance, transforms
-from firstfix.sim.phases import CarryTo, DriveTo, Manner, Slip, Stand
-from firstfix.sim.scenario import Scenario, set_stage
-from firstfix.sim.stage import Moment, Stage
-from firstfix.sim.world import WORLDS, random_free_pose
+from firstfix.io.ros_messages.incoming import to_seconds
+from firstfix.io.ros_messages.outgoing import pose_with_covariance, transforms
+from firstfix.lab.scenarios.phases import CarryTo, DriveTo, Manner, Slip, Stand
+from firstfix.lab.scenarios.scenario import Scenario, set_stage
+from firstfix.lab.simulation.simulation import Moment, Stage
+from firstfix.lab.worlds.catalog import WORLDS, random_free_pose
+from firstfix.ros.ros1.master import is_forgotten, register_anew
+from firstfix.ros.ros1.types import make, message_class
 
 # Whoever is carried off is no longer where it was.
 FAR_M = 2.0

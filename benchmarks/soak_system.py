@@ -17,8 +17,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "robots"))
 
 from ros1_lab import Master, Program
 
-from firstfix.formats.map_server import save_map
-from firstfix.sim.world import WORLDS
+from firstfix.io.maps.map_server import save_map
+from firstfix.lab.worlds.catalog import WORLDS
 
 HERE = Path(__file__).parent
 

@@ -45,8 +45,8 @@ def listen(lines: Lines) -> None:
     import rospy
     from soak_robot import stay_known
 
-    from firstfix.adapters.ros1_types import message_class
-    from firstfix.formats.messages import planar, to_pose, to_seconds, to_transform
+    from firstfix.io.ros_messages.incoming import planar, to_pose, to_seconds, to_transform
+    from firstfix.ros.ros1.types import message_class
 
     def hear(topic: str, message: Any) -> None:
         at = time.time()

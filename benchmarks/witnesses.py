@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.amcl import sensor as sensor_module
-from firstfix.amcl import track as track_module
-from firstfix.amcl.beams import Beams
+from firstfix.amcl import tracker as track_module
+from firstfix.amcl.beam_selection import Beams
 from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.likelihood_field import LikelihoodField
 from firstfix.amcl.particles import Particles
@@ -28,10 +28,10 @@ from firstfix.amcl.sensor import Sensor
 from firstfix.core.angles import wrap
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.evaluation.drive import Drive, plan_drive
-from firstfix.evaluation.track import TRUE_START, follow_drive
-from firstfix.formats.map_server import load_map
-from firstfix.formats.recording import load_recording
+from firstfix.io.logs.load import load_recording
+from firstfix.io.maps.map_server import load_map
+from firstfix.lab.experiments.drive import Drive, plan_drive
+from firstfix.lab.experiments.drive_tracking import TRUE_START, follow_drive
 
 WITNESSES = (8, 15, 30, 60)
 CHI2_3SIGMA = 14.16

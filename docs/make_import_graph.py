@@ -11,14 +11,14 @@ BEGIN, END = "```mermaid\n", "```\n"
 # The roof imports all rooms, and all rooms stand on the floor: those arrows would hide the others.
 ROOF, FLOOR = "cli", "core"
 ROOMS = (
-    "adapters.web",
-    "adapters",
-    "system",
-    "sim",
-    "formats",
-    "evaluation",
-    "global_localization",
+    "lab",
+    "web",
+    "ros",
+    "localizer",
+    "io",
+    "plots",
     "amcl",
+    "global_localization",
     "fields",
 )
 

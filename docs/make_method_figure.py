@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 import firstfix as ff
-from firstfix.evaluation.figure import GREEN, RED, new_figure, save_figure
-from firstfix.evaluation.map_image import draw_map
 from firstfix.fields.distance import euclidean_distance
-from firstfix.sim.lidar import Lidar
-from firstfix.sim.world import WORLDS
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import WORLDS
+from firstfix.plots.figure import GREEN, RED, new_figure, save_figure
+from firstfix.plots.map_image import draw_map
 
 PICTURE = Path(__file__).parent / "explanation" / "method.png"
 TRUTH = ff.SE2(14.5, 15.0, 0.6)
@@ -24,7 +24,7 @@ def main() -> None:
     """Draw two scores of one scan, and what is left of all positions."""
     grid = WORLDS["office"]()
     scan = Lidar().scan(grid, TRUTH, np.random.default_rng(1))
-    locator = ff.Locator(grid)
+    matcher = ff.ScanMatcher(grid)
     figure = new_figure(12.0, 7.4)
     near, far, whole, last = figure.subplots(2, 2).flat
 
@@ -35,14 +35,14 @@ def main() -> None:
         _mark(axes, pose)
         axes.set_title(f"distance to walls; end points at a {words} pose")
 
-    poses, shares = _explained(locator, grid, scan)
+    poses, shares = _explained(matcher, grid, scan)
     draw_map(whole, grid)
     seen = whole.scatter(poses[:, 0], poses[:, 1], c=shares, s=2.5, marker="s", cmap="viridis")
     figure.colorbar(seen, ax=whole, label="share of beams explained")
     whole.set_title(f"every {STEP_M} m, at the right heading")
     _mark(whole, TRUTH)
 
-    result = locator.locate(scan)
+    result = matcher.locate(scan)
     draw_map(last, grid)
     for hypothesis in reversed(result.hypotheses):
         colour = GREEN if hypothesis is result.best else RED
@@ -60,11 +60,11 @@ def _draw_distance(axes, grid: ff.OccupancyGrid) -> None:
     axes.imshow(metres, origin="lower", extent=extent, cmap="Blues_r")
 
 
-def _explained(locator: ff.Locator, grid: ff.OccupancyGrid, scan: ff.LaserScan):
+def _explained(matcher: ff.ScanMatcher, grid: ff.OccupancyGrid, scan: ff.LaserScan):
     stride = round(STEP_M / grid.resolution)
     rows, columns = np.nonzero(grid.seen_free[::stride, ::stride])
     points = grid.to_map(stride * np.column_stack([columns, rows]) + 0.5)
-    looks = locator.examine(scan, [ff.SE2(x, y, TRUTH.yaw) for x, y in points.tolist()])
+    looks = matcher.examine(scan, [ff.SE2(x, y, TRUTH.yaw) for x, y in points.tolist()])
     return points, np.array([look.evidence.explained for look in looks])
 
 

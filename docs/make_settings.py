@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from firstfix.adapters.parameters import Parameter, parameters
+from firstfix.ros.parameters import Parameter, parameters
 
 PAGE = Path(__file__).parent / "reference" / "settings.md"
 HEAD = """# Settings

@@ -17,8 +17,8 @@ with atheris.instrument_imports(include=["firstfix"]):
     import firstfix.core.grid
     import firstfix.core.recording
 # Not the layers of kernels: instrumented, those do not compile.
-import firstfix.global_localization.locate
-import firstfix.system.localizer  # noqa: F401
+import firstfix.global_localization.scan_matcher
+import firstfix.localizer.localizer  # noqa: F401
 
 with atheris.instrument_imports(include=["firstfix", "rosbags"]):
     from targets import TARGETS, seeds, try_one

@@ -26,20 +26,17 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 from starlette.exceptions import HTTPException
 
-from firstfix.adapters.ros_arguments import settings_from
-from firstfix.adapters.web.body import JSON, NPZ
-from firstfix.adapters.web.locate_api import LocateDesk
-from firstfix.adapters.web.orders import order_of
-from firstfix.adapters.web.strict_json import parsed
-from firstfix.adapters.web.view import ShownMap
 from firstfix.core.errors import FirstfixError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import Mounting
 from firstfix.core.se2 import SE2
-from firstfix.formats.amcl_yaml import load_amcl_config
-from firstfix.formats.map_check import check_map
-from firstfix.formats.map_server import load_map, save_map
-from firstfix.formats.messages import (
+from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.io.logs.load import load_recording
+from firstfix.io.logs.tum import load_tum
+from firstfix.io.maps.check import check_map
+from firstfix.io.maps.map_server import load_map, save_map
+from firstfix.io.parameters.amcl_yaml import load_amcl_config
+from firstfix.io.ros_messages.incoming import (
     to_grid,
     to_laser_scan,
     to_odometry,
@@ -47,10 +44,13 @@ from firstfix.formats.messages import (
     to_pose,
     to_transform,
 )
-from firstfix.formats.recording import load_recording
-from firstfix.formats.saved_pose import SavedPose, load_pose, save_pose
-from firstfix.formats.tum import load_tum
-from firstfix.global_localization.locate import Locator
+from firstfix.io.saved_pose import SavedPose, load_pose, save_pose
+from firstfix.ros.arguments import settings_from
+from firstfix.web.commands import order_of
+from firstfix.web.locate_queue import LocateQueue
+from firstfix.web.request_body import JSON, NPZ
+from firstfix.web.strict_json import parsed
+from firstfix.web.view import ShownMap
 
 MAX_CELLS = 1_000_000
 _HEADER = b"image: map.%s\nresolution: 0.05\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n"
@@ -152,7 +152,7 @@ def read_order(data: bytes, _: Path) -> None:
 def _search_for(kind: str) -> Target:
     def read(data: bytes, _: Path) -> None:
         with suppress(HTTPException):
-            asyncio.run(LocateDesk().answer(data, kind, None, _small_map()))
+            asyncio.run(LocateQueue().answer(data, kind, None, _small_map()))
 
     return read
 
@@ -162,7 +162,7 @@ def _small_map() -> ShownMap:
     cells = np.zeros((40, 60), np.int8)
     cells[[0, -1]] = cells[:, [0, -1]] = cells[20, 10:30] = 100
     grid = OccupancyGrid(cells, 0.1)
-    return ShownMap("small", "key", grid, Locator(grid))
+    return ShownMap("small", "key", grid, ScanMatcher(grid))
 
 
 # What each type of message is made into; with DDS, its bytes come from whoever is in the network.
@@ -181,7 +181,7 @@ _CONVERSIONS: dict[str, Callable[[Any], object]] = {
 
 def _cdr_of(kind: str) -> Target:
     def read(data: bytes, _: Path) -> None:
-        from firstfix.adapters.dds_types import decode
+        from firstfix.ros.dds.types import decode
 
         _CONVERSIONS[kind](decode(kind, data))
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from firstfix.adapters.parameters import parameters
+from firstfix.ros.parameters import parameters
 
 FILE = Path(__file__).parent / "config" / "firstfix.yaml"
 HEAD = """# All parameters of the node, with their defaults: keep the lines that you change.

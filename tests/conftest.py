@@ -18,8 +18,8 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.recording import Recording
 from firstfix.core.se2 import SE2
 from firstfix.core.trajectory import Trajectory
-from firstfix.sim.drawing import Drawing
-from firstfix.sim.lidar import Lidar
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.drawing import Drawing
 
 # Of 100 that hypothesis likes to draw: a third of the time, and what they miss, others find later.
 CHECK_EXAMPLES = 30

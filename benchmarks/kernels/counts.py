@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from firstfix.core.angles import FULL_TURN
 from firstfix.fields.raycast import _is_inside_cell, _towards
-from firstfix.sim.wavefront import _improve
+from firstfix.lab.simulation.wavefront import _improve
 
 
 @njit

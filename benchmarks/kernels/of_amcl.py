@@ -9,7 +9,7 @@ from kernel import Kernel
 from of_fields import LEAP_OPERATIONS, leap_roofs
 
 from firstfix.amcl import bins, clusters, kld, likelihood_field, motion, ray_model, resampling
-from firstfix.amcl.beams import Beams, choose_beams
+from firstfix.amcl.beam_selection import Beams, choose_beams
 from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.initial import around_pose
 from firstfix.amcl.particles import Particles

@@ -11,14 +11,14 @@ from of_fields import leap_roofs
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.fields.clearance import chessboard_clearance
-from firstfix.sim import sweep, wavefront
+from firstfix.lab.simulation import sweep, wavefront
 
 BEAMS = 2000
 PEOPLE = 6
 
 
 def kernels(grid: OccupancyGrid, pose: SE2, rng: np.random.Generator) -> list[Kernel]:
-    """All of firstfix.sim, around one pose."""
+    """All of firstfix.lab.simulation, around one pose."""
     return [_swept(grid, pose, rng), _walked(grid, pose)]
 
 

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from firstfix.core.scan import LaserScan, Mounting
     from firstfix.core.se2 import SE2
     from firstfix.core.trajectory import Trajectory
-    from firstfix.formats.map_server import load_map, save_map
-    from firstfix.formats.recording import load_recording
     from firstfix.global_localization.config import LocateConfig, Method
-    from firstfix.global_localization.locate import Locator
-    from firstfix.system.config import LocalizerConfig
-    from firstfix.system.inputs import NewMap
-    from firstfix.system.localizer import Localizer
+    from firstfix.global_localization.scan_matcher import ScanMatcher
+    from firstfix.io.logs.load import load_recording
+    from firstfix.io.maps.map_server import load_map, save_map
+    from firstfix.localizer.config import LocalizerConfig
+    from firstfix.localizer.inputs import NewMap
+    from firstfix.localizer.localizer import Localizer
 
 __version__ = "0.1.0"
 
@@ -34,7 +34,6 @@ __all__ = [  # noqa: RUF022 - plainly sorted, as a reader looks for a name
     "LocalizerConfig",
     "LocateConfig",
     "LocateResult",
-    "Locator",
     "MapError",
     "Method",
     "Mounting",
@@ -44,6 +43,7 @@ __all__ = [  # noqa: RUF022 - plainly sorted, as a reader looks for a name
     "Recording",
     "SE2",
     "ScanError",
+    "ScanMatcher",
     "SearchReport",
     "Trajectory",
     "Verdict",
@@ -62,13 +62,13 @@ _ROOMS = {
     "core.scan": ("LaserScan", "Mounting"),
     "core.se2": ("SE2",),
     "core.trajectory": ("Trajectory",),
-    "formats.map_server": ("load_map", "save_map"),
-    "formats.recording": ("load_recording",),
+    "io.maps.map_server": ("load_map", "save_map"),
+    "io.logs.load": ("load_recording",),
     "global_localization.config": ("LocateConfig", "Method"),
-    "global_localization.locate": ("Locator",),
-    "system.config": ("LocalizerConfig",),
-    "system.inputs": ("NewMap",),
-    "system.localizer": ("Localizer",),
+    "global_localization.scan_matcher": ("ScanMatcher",),
+    "localizer.config": ("LocalizerConfig",),
+    "localizer.inputs": ("NewMap",),
+    "localizer.localizer": ("Localizer",),
 }
 _HOMES = {name: room for room, names in _ROOMS.items() for name in names}
 

@@ -15,8 +15,8 @@ from firstfix.amcl.initial import free_poses
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.sim.drawing import Drawing
-from firstfix.sim.lidar import Lidar
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.drawing import Drawing
 
 LIDAR = Lidar(beams=60)
 

@@ -16,7 +16,7 @@ from firstfix.amcl.sensor import build_sensor
 from firstfix.core.angles import angle_error, wrap
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.sim.lidar import Lidar
+from firstfix.lab.simulation.lidar import Lidar
 
 LIDAR = Lidar(beams=60)
 NEAR = np.diag([0.01, 0.01, 0.003])

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from firstfix.amcl import likelihood_field
-from firstfix.amcl.beams import Beams, choose_beams
+from firstfix.amcl.beam_selection import Beams, choose_beams
 from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.amcl.likelihood_field import LikelihoodField, likelihoods
 from firstfix.amcl.particles import Particles, equal_weights

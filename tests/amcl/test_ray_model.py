@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from firstfix.amcl.beams import choose_beams
+from firstfix.amcl.beam_selection import choose_beams
 from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.amcl.particles import Particles, equal_weights
 from firstfix.amcl.ray_model import RayModel
@@ -17,7 +17,7 @@ from firstfix.core.grid import OCCUPIED, OccupancyGrid
 from firstfix.core.scan import LaserScan, Mounting
 from firstfix.core.se2 import SE2
 from firstfix.fields.raycast import expected_ranges
-from firstfix.sim.lidar import Lidar
+from firstfix.lab.simulation.lidar import Lidar
 
 BEAM = AmclConfig(laser_model_type=SensorModel.BEAM)
 PLACE = SE2(0.4, -0.3, 2.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from firstfix.amcl.beams import Beams, choose_beams
+from firstfix.amcl.beam_selection import Beams, choose_beams
 from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.amcl.likelihood_field import LikelihoodField
 from firstfix.amcl.particles import Particles, equal_weights
@@ -16,7 +16,7 @@ from firstfix.amcl.ray_model import RayModel
 from firstfix.amcl.sensor import INDEPENDENT_BEAMS, build_sensor, weigh
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.sim.lidar import Lidar
+from firstfix.lab.simulation.lidar import Lidar
 
 
 class Told:

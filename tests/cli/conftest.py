@@ -13,11 +13,11 @@ from firstfix.cli.app import run
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.recording import Recording
 from firstfix.core.se2 import SE2
-from firstfix.formats.map_server import save_map
-from firstfix.formats.npz_writer import save_npz
-from firstfix.sim.drawing import Drawing
-from firstfix.sim.lidar import Lidar
-from firstfix.sim.world import identical_rooms
+from firstfix.io.logs.npz_writer import save_npz
+from firstfix.io.maps.map_server import save_map
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import identical_rooms
+from firstfix.lab.worlds.drawing import Drawing
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,8 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
         return results
 
     # `apart` last: who is imported now must keep the true one for later.
-    for place in ("bench", "track_bench", "apart"):
-        monkeypatch.setattr(f"firstfix.evaluation.{place}.run_apart", run)
+    for place in ("case_tasks", "track_bench", "process_pool"):
+        monkeypatch.setattr(f"firstfix.lab.experiments.{place}.run_apart", run)
 
 
 def write_case(folder: Path, grid: OccupancyGrid, poses: list[SE2], site: str) -> Path:

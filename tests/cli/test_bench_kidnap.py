@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from firstfix.cli import kidnap_scripts
-from firstfix.cli.kidnap_play import CaseTask, simulated, watched
-from firstfix.cli.kidnap_scripts import scripted
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.recording import Recording
-from firstfix.evaluation.case import Case
-from firstfix.evaluation.kidnap import judge_trial
-from firstfix.sim.phases import CarryTo, DriveTo, Phase, Slip, Stand, Teleport
-from firstfix.sim.recorded import record
-from firstfix.sim.scenario import Scenario, run
+from firstfix.lab.experiments.case import Case
+from firstfix.lab.experiments.kidnap_runner import CaseTask, simulated, watched
+from firstfix.lab.metrics.kidnap_trial import judge_trial
+from firstfix.lab.scenarios import kidnap_scripts
+from firstfix.lab.scenarios.kidnap_scripts import scripted
+from firstfix.lab.scenarios.phases import CarryTo, DriveTo, Phase, Slip, Stand, Teleport
+from firstfix.lab.scenarios.scenario import Scenario, run
+from firstfix.lab.simulation.recorder import record
 
 KINDS = ["teleport", "carry", "teleport_driving", "crowd_teleport", "slip", "crowd", "nothing"]
 

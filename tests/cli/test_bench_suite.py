@@ -7,12 +7,17 @@ import numpy as np
 import pytest
 
 from firstfix.cli.bench_scaling import bench_scaling
-from firstfix.cli.paper_play import PAPER_WORLDS, at_home, follow_with_system, simulated_drive
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.recording import Recording
-from firstfix.evaluation.outcome import is_found
-from firstfix.evaluation.starts import Start
-from firstfix.sim.floor import Floor
+from firstfix.lab.experiments.paper_runner import (
+    PAPER_WORLDS,
+    at_home,
+    follow_with_system,
+    simulated_drive,
+)
+from firstfix.lab.experiments.starts import Start
+from firstfix.lab.metrics.outcome import is_found
+from firstfix.lab.simulation.floor import Floor
 
 
 def test_the_origin_of_every_world_is_a_place_where_a_robot_can_be() -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from firstfix import __version__
-from firstfix.sim.mishaps import CarryTo, Teleport
-from firstfix.sim.phases import Stand
+from firstfix.lab.scenarios.disturbances import CarryTo, Teleport
+from firstfix.lab.scenarios.phases import Stand
 
 Files = tuple[Path, Path]
 
@@ -121,7 +121,7 @@ def test_map_check_names_the_places_that_look_alike(cli, alike: Files) -> None:
 def test_map_check_asks_before_it_works_long(
     cli, unique: Files, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("firstfix.cli.alike.MOST_CELLS", 1000)
+    monkeypatch.setattr("firstfix.cli.map_aliasing.MOST_CELLS", 1000)
     assert "ask for it with --samples 40" in cli("map", "check", unique[0]).out
     assert "2 random places" in cli("map", "check", unique[0], "--samples", 2).out
     assert cli("map", "check", unique[0], "--samples", 0).out.endswith("no traps found\n")
@@ -159,7 +159,7 @@ def test_map_show_draws_here_and_never_over_the_map(cli, unique: Files, tmp_path
 def short_story(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the robot of the demo stand, and be carried away: some seconds instead of a minute."""
     acts = (Stand(1.0), CarryTo(seconds=1.0), Stand(1.0), Teleport(), Stand(3.0))
-    monkeypatch.setattr("firstfix.cli.story.SCRIPT", acts)
+    monkeypatch.setattr("firstfix.lab.scenarios.demo_scenario.SCRIPT", acts)
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import pytest
 from firstfix.cli import doctor
 from firstfix.cli.doctor import told_as_unkept
 
-UNKEPT = "cannot cache function '_sweep': no locator available for file 'clearance.py'"
+UNKEPT = "cannot cache function '_sweep': no matcher available for file 'clearance.py'"
 
 
 def line(ended, title: str) -> str:

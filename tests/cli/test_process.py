@@ -62,7 +62,7 @@ def test_ctrl_c_ends_with_130_and_no_traceback(unique: Files) -> None:
     script = (
         "import _thread, signal, sys; from firstfix.cli.app import run; "
         "signal.signal(signal.SIGINT, signal.default_int_handler); "
-        "from firstfix.formats import map_server; "
+        "from firstfix.io.maps import map_server; "
         "map_server.load_map = lambda path: _thread.interrupt_main(); "
         f"sys.exit(run(['locate', {str(unique[0])!r}, {str(unique[1])!r}]))"
     )

@@ -151,7 +151,7 @@ def test_options_that_are_none(cli) -> None:
 
 def test_a_robot_whose_ros_is_not_here(cli, unique: Files, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "rclpy", None)
-    monkeypatch.delitem(sys.modules, "firstfix.adapters.ros2", raising=False)
+    monkeypatch.delitem(sys.modules, "firstfix.ros.ros2.node", raising=False)
     assert_one_line(cli("serve", unique[0], "--robot", "ros2"), "rclpy", "setup.bash")
 
 
@@ -160,9 +160,9 @@ def test_a_picture_of_the_demo_needs_the_story(cli) -> None:
 
 
 def test_a_browser_is_opened_only_where_somebody_sits(monkeypatch, capsys) -> None:
-    from firstfix.adapters.web.guard import Access
-    from firstfix.adapters.web.server import listen
     from firstfix.cli import live
+    from firstfix.web.guard import Access
+    from firstfix.web.server import listen
 
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", opened.append)

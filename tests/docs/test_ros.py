@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from firstfix.adapters.parameters import configured, flattened, parameters
-from firstfix.adapters.ros_arguments import names_from, settings_from
-from firstfix.adapters.topics import PARTICLES, heard_topics, said_topics
-from firstfix.system.node_config import Mode, NodeConfig
+from firstfix.ros.arguments import names_from, settings_from
+from firstfix.ros.channels import PARTICLES, heard_topics, said_topics
+from firstfix.ros.node_config import Mode, NodeConfig
+from firstfix.ros.parameters import configured, flattened, parameters
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "ros.md").read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import firstfix
-from firstfix.system.transitions import TABLE
+from firstfix.localizer.states import TABLE
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

@@ -15,8 +15,8 @@ from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields, build_fields
-from firstfix.global_localization.locate import Locator
-from firstfix.sim.world import office
+from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.lab.worlds.catalog import office
 
 
 @pytest.fixture(scope="session")
@@ -57,8 +57,8 @@ def maps_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def office_locator(maps_cache: Path) -> Locator:
-    return Locator(office(), cache_dir=maps_cache)
+def office_locator(maps_cache: Path) -> ScanMatcher:
+    return ScanMatcher(office(), cache_dir=maps_cache)
 
 
 @pytest.fixture(scope="session")

@@ -10,9 +10,9 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import Mounting
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.config import Method
-from firstfix.global_localization.locate import Locator
-from firstfix.sim.lidar import Lidar
-from firstfix.sim.world import identical_rooms, random_free_pose
+from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import identical_rooms, random_free_pose
 
 LIDAR = Lidar(beams=360, sigma_m=0.01)
 
@@ -24,8 +24,8 @@ def test_where_the_map_lies_moves_the_answer_and_nothing_else(origin, method):
     moved = OccupancyGrid(grid.cells, grid.resolution, origin @ grid.T_map_grid)
     rng = np.random.default_rng(3)
     scan = LIDAR.scan(grid, random_free_pose(grid, rng), rng)
-    here = Locator(grid, method=method).locate(scan)
-    there = Locator(moved, method=method).locate(scan)
+    here = ScanMatcher(grid, method=method).locate(scan)
+    there = ScanMatcher(moved, method=method).locate(scan)
     assert (here.verdict, here.reason, here.search) == (there.verdict, there.reason, there.search)
     R = origin.rotation_jacobian()
     for a, b in zip(here.hypotheses, there.hypotheses, strict=True):
@@ -42,8 +42,8 @@ def test_where_the_sensor_sits_moves_the_base_and_nothing_else(method, with_pose
     rng = np.random.default_rng(4)
     scan = LIDAR.scan(grid, random_free_pose(grid, rng), rng)
     T_base_laser = SE2(0.3, -0.2, 2.2)
-    locator = Locator(grid, method=method)
-    laser, base = (locator.locate(s) for s in (scan, with_pose(scan, T_base_laser=T_base_laser)))
+    matcher = ScanMatcher(grid, method=method)
+    laser, base = (matcher.locate(s) for s in (scan, with_pose(scan, T_base_laser=T_base_laser)))
     assert laser.verdict is base.verdict
     for a, b in zip(laser.hypotheses, base.hypotheses, strict=True):
         on_robot = b.pose @ T_base_laser

@@ -11,9 +11,9 @@ from firstfix.core.angles import FULL_TURN
 from firstfix.core.estimate import Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.global_localization.config import Method
-from firstfix.global_localization.locate import Locator
-from firstfix.sim.lidar import Lidar
-from firstfix.sim.world import random_free_pose
+from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import random_free_pose
 
 LIDAR = Lidar(beams=360, sigma_m=0.01)
 
@@ -32,9 +32,9 @@ SILENT = {
 @pytest.mark.parametrize("reading", SILENT.values(), ids=SILENT.keys())
 @pytest.mark.parametrize("method", Method)
 def test_a_scan_without_a_hit_matches_nothing_and_says_so(reading, method, draw_room):
-    locator = Locator(draw_room(0.25), method=method)
+    matcher = ScanMatcher(draw_room(0.25), method=method)
     scan = LaserScan(np.full(360, reading, np.float32), -np.pi, FULL_TURN / 360, 0.1, 12.0)
-    result = locator.locate(scan)
+    result = matcher.locate(scan)
     assert result.verdict is Verdict.NO_MATCH
     assert "only 0 of 360 beams" in result.reason
     assert result.best is None
@@ -72,11 +72,11 @@ def test_ranges_far_beyond_the_map_are_no_trouble(room):
     ranges = np.full(90, 1.5, np.float32)
     ranges[::9] = [200.0, 1e4, 1e9, 1e30, 3e38] * 2
     scan = LaserScan(ranges, -np.pi, FULL_TURN / 90, 0.1, math.inf)
-    assert Locator(room.grid).locate(scan).verdict is not Verdict.UNIQUE
+    assert ScanMatcher(room.grid).locate(scan).verdict is not Verdict.UNIQUE
 
 
 def test_the_paper_takes_ranges_far_beyond_the_map_as_well(room):
     ranges = np.full(90, 1.5, np.float32)
     ranges[7] = 3e38
     scan = LaserScan(ranges, -np.pi, FULL_TURN / 90, 0.1, math.inf)
-    assert Locator(room.grid, method=Method.PAPER).locate(scan).hypotheses
+    assert ScanMatcher(room.grid, method=Method.PAPER).locate(scan).hypotheses

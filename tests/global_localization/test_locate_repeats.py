@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from firstfix.core.scan import LaserScan
-from firstfix.global_localization.locate import Locator
-from firstfix.sim.lidar import Lidar
-from firstfix.sim.world import random_free_pose
+from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import random_free_pose
 
 LIDAR = Lidar(beams=360, sigma_m=0.01)
 
@@ -34,20 +34,20 @@ def test_threads_may_share_a_locator_from_the_first_scan_on(room, told):
     """Nothing is prepared late in a way that two threads could disturb."""
     rng = np.random.default_rng(8)
     scan = LIDAR.scan(room.grid, random_free_pose(room.grid, rng), rng)
-    fresh = Locator(room.grid)
+    fresh = ScanMatcher(room.grid)
     with ThreadPoolExecutor(4) as pool:
         results = [told(result) for result in pool.map(fresh.locate, [scan] * 4)]
-    assert results == [told(Locator(room.grid).locate(scan))] * 4
+    assert results == [told(ScanMatcher(room.grid).locate(scan))] * 4
 
 
 PROGRAM = """
 import numpy as np
-from firstfix.global_localization.locate import Locator
-from firstfix.sim.lidar import Lidar
-from firstfix.sim.world import identical_rooms, random_free_pose
+from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import identical_rooms, random_free_pose
 grid = identical_rooms(2)
 rng = np.random.default_rng(9)
-result = Locator(grid).locate(Lidar().scan(grid, random_free_pose(grid, rng), rng))
+result = ScanMatcher(grid).locate(Lidar().scan(grid, random_free_pose(grid, rng), rng))
 for h in result.hypotheses:
     print([float(x).hex() for x in (*h.pose.as_array(), *h.covariance.ravel(), h.score)])
 """
@@ -75,6 +75,6 @@ def test_the_scan_is_not_changed(office_locator):
 def test_a_cache_changes_nothing(room, tmp_path, told):
     rng = np.random.default_rng(11)
     scan = LIDAR.scan(room.grid, random_free_pose(room.grid, rng), rng)
-    fresh = told(Locator(room.grid).locate(scan))
+    fresh = told(ScanMatcher(room.grid).locate(scan))
     for _ in range(2):
-        assert told(Locator(room.grid, cache_dir=tmp_path).locate(scan)) == fresh
+        assert told(ScanMatcher(room.grid, cache_dir=tmp_path).locate(scan)) == fresh

@@ -13,7 +13,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields, build_fields
 from firstfix.global_localization.beams import Beams, usable_beams
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
-from firstfix.sim.lidar import Lidar
+from firstfix.lab.simulation.lidar import Lidar
 
 RESOLUTION = 0.05
 LIDAR = Lidar(beams=360, sigma_m=0.01, range_max=12.0)

@@ -27,7 +27,7 @@ from firstfix.global_localization.search import (
     Candidates,
     search,
 )
-from firstfix.sim.lidar import Lidar
+from firstfix.lab.simulation.lidar import Lidar
 
 UNIT = 2.0**-23  # metres that the integer scores count
 PLACE = 2  # positions to the side of a place of the shortlist

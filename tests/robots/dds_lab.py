@@ -119,8 +119,8 @@ class Lab:
 
     def latched_sender(self, topic: str, kind: str) -> Any:
         """Publish a latched topic of ROS."""
-        from firstfix.adapters.dds_ends import Sender
-        from firstfix.adapters.topics import Delivery, Topic
+        from firstfix.ros.channels import Delivery, Topic
+        from firstfix.ros.dds.endpoints import Sender
 
         return Sender(self.participant, Topic(topic, kind, Delivery.LATCHED), f"rt{topic}")
 
@@ -149,7 +149,7 @@ class Ear:
         from cyclonedds.sub import DataReader
         from cyclonedds.topic import Topic
 
-        from firstfix.adapters.dds_types import Cdr, decode, described
+        from firstfix.ros.dds.types import Cdr, decode, described
 
         self._decode = lambda data: decode(kind, data)
         topic = Topic(participant, name, described(kind))
@@ -186,7 +186,7 @@ def wait_for(find: Callable[[], Found], patience_s: float = PATIENCE_S) -> Found
 
 def pose_of(message: Any) -> tuple[float, float, float]:
     """Return x, y, yaw of a PoseWithCovarianceStamped."""
-    from firstfix.formats.messages import to_planar, to_pose
+    from firstfix.io.ros_messages.incoming import to_planar, to_pose
 
     where = to_planar(to_pose(message))
     return where.x, where.y, where.yaw

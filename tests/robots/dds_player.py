@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from dds_robot import RELIABLE, writer
 
-from firstfix.adapters.dds_types import Cdr
+from firstfix.ros.dds.types import Cdr
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""A robot from `firstfix.sim` on plain DDS: run as a program."""
+"""A robot from `firstfix.lab.simulation` on plain DDS: run as a program."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from play import BASE, LASER, play
 from scripts import SCRIPTS
 
-from firstfix.adapters.dds_types import Cdr, described, encode, make
-from firstfix.formats.outgoing import occupancy_grid, transforms
+from firstfix.io.ros_messages.outgoing import occupancy_grid, transforms
+from firstfix.ros.dds.types import Cdr, described, encode, make
 
 LATCHED = ("/tf_static", "map")
 TYPES = {

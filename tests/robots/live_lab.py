@@ -11,17 +11,17 @@ from typing import Any
 
 import pytest
 
-from firstfix.adapters.sim_node import SimNode
-from firstfix.adapters.sim_robot import SimRobot
-from firstfix.adapters.web.feed import Feed
-from firstfix.adapters.web.guard import Access
-from firstfix.adapters.web.page import Page
-from firstfix.adapters.web.server import listen, make_server, url_of
-from firstfix.adapters.web.steering import Steering
 from firstfix.core.grid import OccupancyGrid
-from firstfix.sim.world import WORLDS
-from firstfix.system.inputs import Input, NewMap
-from firstfix.system.localizer import Localizer
+from firstfix.lab.live.simulated_node import SimNode
+from firstfix.lab.live.steered_robot import SimRobot
+from firstfix.lab.worlds.catalog import WORLDS
+from firstfix.localizer.inputs import Input, NewMap
+from firstfix.localizer.localizer import Localizer
+from firstfix.web.feed import Feed
+from firstfix.web.guard import Access
+from firstfix.web.page import Page
+from firstfix.web.server import listen, make_server, url_of
+from firstfix.web.steering import Steering
 
 WAIT_S = 180.0
 

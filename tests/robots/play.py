@@ -12,8 +12,8 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.formats.outgoing import Make, laser_scan, transforms
-from firstfix.sim.scenario import Scenario, run
+from firstfix.io.ros_messages.outgoing import Make, laser_scan, transforms
+from firstfix.lab.scenarios.scenario import Scenario, run
 
 ODOM, BASE, LASER = "odom", "base_footprint", "laser"
 KOBUKI = {

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from firstfix.adapters.topics import PARTICLES, Heard, Topic
-from firstfix.adapters.transport import Gravity
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.formats.outgoing import laser_scan, occupancy_grid, transforms
-from firstfix.sim.lidar import Lidar
+from firstfix.io.ros_messages.outgoing import laser_scan, occupancy_grid, transforms
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.ros.channels import PARTICLES, Heard, Topic
+from firstfix.ros.transport import Severity
 
 ODOM, BASE, LASER = "odom", "base_footprint", "laser"
 T_BASE_LASER = SE2(0.1, 0.0, 0.0)
@@ -32,7 +32,7 @@ class Recorder:
         self.particles = particles
         self.listening: dict[str, int] = {}
         self.published: list[tuple[Topic, Any]] = []
-        self.lines: list[tuple[Gravity, str]] = []
+        self.lines: list[tuple[Severity, str]] = []
         self.threads: set[str] = set()
 
     def make(self, type_name: str, /, **fields: Any) -> Any:
@@ -47,14 +47,14 @@ class Recorder:
     def listeners(self, topic: Topic) -> int:
         return self.listening.get(topic.name, 0)
 
-    def log(self, gravity: Gravity, text: str) -> None:
+    def log(self, gravity: Severity, text: str) -> None:
         self.lines.append((gravity, text))
 
     def on(self, topic: Topic) -> list[Any]:
         """Return the messages of a topic, in order."""
         return [message for where, message in self.published if where is topic]
 
-    def told(self, gravity: Gravity) -> list[str]:
+    def told(self, gravity: Severity) -> list[str]:
         """Return the lines of the log that are that grave."""
         return [text for how, text in self.lines if how is gravity]
 

@@ -1,4 +1,4 @@
-"""A bag of ROS 1 from `firstfix.sim`, as a robot would have recorded it."""
+"""A bag of ROS 1 from `firstfix.lab.simulation`, as a robot would have recorded it."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scripts import SCRIPTS
 
 from firstfix.core.se2 import SE2
-from firstfix.formats.outgoing import occupancy_grid, transforms
-from firstfix.sim.scenario import run
+from firstfix.io.ros_messages.outgoing import occupancy_grid, transforms
+from firstfix.lab.scenarios.scenario import run
 
 STORE = get_typestore(Stores.ROS1_NOETIC)
 STORE.register(

@@ -1,4 +1,4 @@
-"""A rospy robot from `firstfix.sim`, run as a program; a line on its stdin tells it to change.
+"""A simulated rospy robot, run as a program; a line on its stdin tells it to change.
 
 Such a line is JSON: ``flaws`` (names of `FLAWS`, instead of those before), ``shift`` (x, y, yaw:
 the map moves by that much, the robot does not), ``ask`` (a service without arguments), ``hint``
@@ -27,10 +27,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 from play import BASE, LASER, play
 from scripts import SCRIPTS, TOLD
 
-from firstfix.adapters.ros1_types import Empty, make, message_class
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.formats.outgoing import occupancy_grid, pose_with_covariance, transforms
+from firstfix.io.ros_messages.outgoing import occupancy_grid, pose_with_covariance, transforms
+from firstfix.ros.ros1.types import Empty, make, message_class
 
 # As kobuki_msgs has them, less the comments.
 DEFINITIONS = {

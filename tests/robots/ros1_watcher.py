@@ -12,8 +12,8 @@ from typing import Any
 
 import rospy
 
-from firstfix.adapters.ros1_types import decoded, message_class
-from firstfix.formats.messages import planar, to_pose, to_seconds, to_transform
+from firstfix.io.ros_messages.incoming import planar, to_pose, to_seconds, to_transform
+from firstfix.ros.ros1.types import decoded, message_class
 
 TYPES = {
     "initialpose": "geometry_msgs/PoseWithCovarianceStamped",

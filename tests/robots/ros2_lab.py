@@ -16,14 +16,14 @@ import pytest
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.formats.outgoing import laser_scan, occupancy_grid, transforms
-from firstfix.sim.lidar import Lidar
+from firstfix.io.ros_messages.outgoing import laser_scan, occupancy_grid, transforms
+from firstfix.lab.simulation.lidar import Lidar
 
 STAND_IN = Path(__file__).parent / "rclpy_stand_in"
 OURS = (
     "rclpy",
     *(f"rclpy.{path.stem}" for path in (STAND_IN / "rclpy").glob("*.py")),
-    *(f"firstfix.adapters.{name}" for name in ("ros2", "ros2_transport", "ros2_types")),
+    *(f"firstfix.ros.ros2.{name}" for name in ("node", "transport", "types")),
 )
 ALL = ("nav2_msgs", "kobuki_ros_interfaces")
 # The wheels never turn: whoever changes the pose of the robot carries it.
@@ -47,8 +47,8 @@ class Lab:
         self.rclpy = importlib.import_module("rclpy")
         self.world = importlib.import_module("rclpy.graph").world
         self.lifecycle = importlib.import_module("rclpy.lifecycle")
-        self.types = importlib.import_module("firstfix.adapters.ros2_types")
-        self.ros2 = importlib.import_module("firstfix.adapters.ros2")
+        self.types = importlib.import_module("firstfix.ros.ros2.types")
+        self.ros2 = importlib.import_module("firstfix.ros.ros2.node")
         self.nodes: list[Any] = []
 
     def node(self, *arguments: str) -> Any:

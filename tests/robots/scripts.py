@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from firstfix.core.grid import OccupancyGrid
-from firstfix.sim.phases import CarryTo, DriveTo, Phase, Stand
-from firstfix.sim.scenario import Scenario
-from firstfix.sim.stage import Moment, Stage
-from firstfix.sim.world import WORLDS, identical_rooms
+from firstfix.lab.scenarios.phases import CarryTo, DriveTo, Phase, Stand
+from firstfix.lab.scenarios.scenario import Scenario
+from firstfix.lab.simulation.simulation import Moment, Stage
+from firstfix.lab.worlds.catalog import WORLDS, identical_rooms
 
 Script = Callable[[], tuple[OccupancyGrid, Scenario, int]]
 

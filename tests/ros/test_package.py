@@ -13,8 +13,8 @@ import pytest
 import yaml
 
 from firstfix import __version__
-from firstfix.adapters.parameters import configured, flattened, parameters
-from firstfix.system.node_config import NodeConfig
+from firstfix.ros.node_config import NodeConfig
+from firstfix.ros.parameters import configured, flattened, parameters
 
 if sys.version_info >= (3, 11):
     import tomllib

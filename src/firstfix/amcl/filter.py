@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.amcl.beams import choose_beams
+from firstfix.amcl.beam_selection import choose_beams
 from firstfix.amcl.clusters import Cluster, find_clusters
 from firstfix.amcl.config import AmclConfig, MotionModel
 from firstfix.amcl.kld import adapted_size

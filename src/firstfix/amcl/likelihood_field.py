@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from firstfix.amcl.beams import Beams
+from firstfix.amcl.beam_selection import Beams
 from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.amcl.particles import Particles
 from firstfix.core.grid import OccupancyGrid

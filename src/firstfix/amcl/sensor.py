@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.amcl.beams import Beams
+from firstfix.amcl.beam_selection import Beams
 from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.amcl.likelihood_field import LikelihoodField
 from firstfix.amcl.particles import Particles

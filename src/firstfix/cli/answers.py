@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from firstfix.core.estimate import Hypothesis, LocateResult
+from firstfix.core.pose_error import PoseError
 from firstfix.core.se2 import SE2
-from firstfix.evaluation.outcome import PoseError
-from firstfix.evaluation.tables import markdown_table
+from firstfix.lab.reports.tables import markdown_table
 
 # What is listed for a person: places that are likely at all, and some to compare them with.
 LEAST_PROBABILITY = 0.001

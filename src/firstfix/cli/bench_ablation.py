@@ -44,9 +44,9 @@ def bench_ablation(
         )
     found = find_cases(cases)
     check_targets(json_file, report)
-    from firstfix.evaluation.ablation import AblationTask, ablation_document, ablation_table
-    from firstfix.evaluation.apart import run_apart
-    from firstfix.evaluation.machine import this_machine
+    from firstfix.lab.experiments.ablation import AblationTask, ablation_document, ablation_table
+    from firstfix.lab.experiments.machine import this_machine
+    from firstfix.lab.experiments.process_pool import run_apart
 
     tasks = [AblationTask(case, limit) for case in found]
     with progress(len(tasks), "bench") as done:
@@ -57,6 +57,6 @@ def bench_ablation(
     if json_file is not None:
         write_json(document, json_file)
     if report is not None:
-        from firstfix.evaluation.suite_reports import write_ablation_report
+        from firstfix.lab.reports.suite_reports import write_ablation_report
 
         typer.echo(f"report: {write_ablation_report(document, report)}", err=True)

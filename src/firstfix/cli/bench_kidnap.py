@@ -13,7 +13,7 @@ from firstfix.cli.worlds import worlds_of
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
-    from firstfix.cli.kidnap_play import CaseTask, Played, WorldTask
+    from firstfix.lab.experiments.kidnap_runner import CaseTask, Played, WorldTask
 
 PANEL = "Kidnapping"
 SCENARIOS = 20
@@ -93,8 +93,8 @@ def bench_kidnap(
     names = _worlds(worlds) if worlds is not None or not cases else []
     tasks = _tasks(names, cases, scenarios, seed)
     check_targets(json_file, report)
-    from firstfix.evaluation.apart import run_apart
-    from firstfix.evaluation.kidnap_bench import kidnap_document, kidnap_table, kinds_table
+    from firstfix.lab.experiments.kidnap_bench import kidnap_document, kidnap_table, kinds_table
+    from firstfix.lab.experiments.process_pool import run_apart
 
     with progress(len(tasks), "bench") as done:
         played = run_apart(tasks, jobs, lambda _, ended: done(ended.name))
@@ -110,13 +110,13 @@ def bench_kidnap(
     if json_file is not None:
         write_json(document, json_file)
     if report is not None:
-        from firstfix.evaluation.kidnap_report import write_kidnap_report
+        from firstfix.lab.reports.kidnap_report import write_kidnap_report
 
         typer.echo(f"report: {write_kidnap_report(runs, document, report)}", err=True)
 
 
 def _worlds(text: str | None) -> list[str]:
-    from firstfix.sim.world import WORLDS
+    from firstfix.lab.worlds.catalog import WORLDS
 
     if text is None:
         return [name for name in WORLDS if name not in _HOPELESS]
@@ -127,7 +127,7 @@ def _tasks(
     worlds: list[str], cases: list[Path], scenarios: int | None, seed: int
 ) -> list[WorldTask | CaseTask]:
     from firstfix.cli.cases import find_cases
-    from firstfix.cli.kidnap_play import CaseTask, WorldTask
+    from firstfix.lab.experiments.kidnap_runner import CaseTask, WorldTask
 
     tasks: list[WorldTask | CaseTask] = [
         WorldTask(world, seeds)

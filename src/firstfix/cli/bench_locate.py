@@ -12,8 +12,8 @@ from firstfix.cli.targets import check_targets, write_json
 from firstfix.global_localization.config import Method
 
 if TYPE_CHECKING:
-    from firstfix.evaluation.bench import CaseTask, ForeignTask
-    from firstfix.evaluation.runs import CaseRun, ForeignRun
+    from firstfix.lab.experiments.case_runs import CaseRun, ForeignRun
+    from firstfix.lab.experiments.case_tasks import CaseTask, ForeignTask
 
 
 def bench_locate(
@@ -51,10 +51,10 @@ def bench_locate(
         If a case cannot be used.
     """
     from firstfix.cli.cases import find_cases
-    from firstfix.evaluation import bench as runner
-    from firstfix.evaluation.document import bench_document
-    from firstfix.evaluation.runs import CaseRun, ForeignRun
-    from firstfix.evaluation.tables import bench_table, foreign_table
+    from firstfix.lab.experiments import case_tasks as runner
+    from firstfix.lab.experiments.case_runs import CaseRun, ForeignRun
+    from firstfix.lab.reports.document import bench_document
+    from firstfix.lab.reports.tables import bench_table, foreign_table
 
     found = find_cases(cases)
     check_targets(json_file, report)
@@ -74,7 +74,7 @@ def bench_locate(
     if json_file is not None:
         write_json(document, json_file)
     if report is not None:
-        from firstfix.evaluation.report import write_report
+        from firstfix.lab.reports.report import write_report
 
         typer.echo(f"report: {write_report(own, document, report)}", err=True)
 

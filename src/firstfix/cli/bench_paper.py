@@ -44,13 +44,13 @@ def bench_paper(
     InputError
         If a world is not known.
     """
-    from firstfix.cli.paper_play import DRIVE_S, PAPER_WORLDS, PaperTask
+    from firstfix.lab.experiments.paper_runner import DRIVE_S, PAPER_WORLDS, PaperTask
 
     names = list(PAPER_WORLDS) if worlds is None else worlds_of(worlds, PAPER_WORLDS)
     check_targets(json_file, report)
-    from firstfix.evaluation.apart import run_apart
-    from firstfix.evaluation.machine import this_machine
-    from firstfix.evaluation.paper_suite import paper_document, paper_table, worlds_table
+    from firstfix.lab.experiments.machine import this_machine
+    from firstfix.lab.experiments.paper_suite import paper_document, paper_table, worlds_table
+    from firstfix.lab.experiments.process_pool import run_apart
 
     tasks = [PaperTask(name, tuple(range(seed, seed + runs))) for name in names]
     with progress(len(tasks), "bench") as done:
@@ -63,7 +63,7 @@ def bench_paper(
     if json_file is not None:
         write_json(document, json_file)
     if report is not None:
-        from firstfix.evaluation.paper_report import write_paper_report
+        from firstfix.lab.reports.paper_report import write_paper_report
 
         page = write_paper_report([ended.shown for ended in played], document, report)
         typer.echo(f"report: {page}", err=True)

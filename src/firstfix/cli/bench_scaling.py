@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from firstfix.core.grid import OccupancyGrid
-    from firstfix.evaluation.scaling import Cost, Sighting, Throughput
+    from firstfix.lab.experiments.scaling import Cost, Sighting, Throughput
 
 # Offices of 42 x 27 m: 1 134 to 113 400 m².
 OFFICES = (1, 3, 10, 32, 100)
@@ -51,8 +51,8 @@ def bench_scaling(
         Numbers of beams that are tried in the smaller maps.
     """
     check_targets(json_file, report)
-    from firstfix.evaluation.machine import this_machine
-    from firstfix.evaluation.scaling import cost_table, scaling_document, threads_table
+    from firstfix.lab.experiments.machine import this_machine
+    from firstfix.lab.experiments.scaling import cost_table, scaling_document, threads_table
 
     by_area: list[Cost] = []
     by_beams: list[Cost] = []
@@ -68,7 +68,7 @@ def bench_scaling(
     if json_file is not None:
         write_json(document, json_file)
     if report is not None:
-        from firstfix.evaluation.suite_reports import write_scaling_report
+        from firstfix.lab.reports.suite_reports import write_scaling_report
 
         typer.echo(f"report: {write_scaling_report(document, report)}", err=True)
 
@@ -84,10 +84,10 @@ def _measure(
     """Measure one map; each task in a new process, so that memory is its own."""
     import numpy as np
 
-    from firstfix.evaluation.apart import run_apart
-    from firstfix.evaluation.scaling import CostTask, ThroughputTask
     from firstfix.global_localization.config import Method
-    from firstfix.sim.many_offices import many_offices
+    from firstfix.lab.experiments.process_pool import run_apart
+    from firstfix.lab.experiments.scaling import CostTask, ThroughputTask
+    from firstfix.lab.worlds.many_offices import many_offices
 
     rng = np.random.default_rng(seed)
     grid = many_offices(count, rng)
@@ -106,9 +106,9 @@ def _measure(
 
 
 def _sightings(grid: OccupancyGrid, beams: int, rng: np.random.Generator) -> tuple[Sighting, ...]:
-    from firstfix.evaluation.scaling import Sighting
-    from firstfix.sim.lidar import Lidar
-    from firstfix.sim.world import random_free_poses
+    from firstfix.lab.experiments.scaling import Sighting
+    from firstfix.lab.simulation.lidar import Lidar
+    from firstfix.lab.worlds.catalog import random_free_poses
 
     lidar = Lidar(beams=beams)
     poses = random_free_poses(grid, rng, _SCANS)

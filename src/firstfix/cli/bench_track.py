@@ -12,7 +12,7 @@ from firstfix.cli.targets import check_file, write_json
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
-    from firstfix.evaluation.track_bench import TrackRun
+    from firstfix.lab.experiments.track_bench import TrackRun
 
 PANEL = "Tracking"
 Params = Annotated[
@@ -62,7 +62,7 @@ def bench_track(
     """
     from firstfix.cli.cases import find_cases
     from firstfix.cli.settings import load_config
-    from firstfix.evaluation.track_bench import (
+    from firstfix.lab.experiments.track_bench import (
         TrackTask,
         run_track_tasks,
         track_document,

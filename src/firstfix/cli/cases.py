@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from firstfix.core.errors import InputError
-from firstfix.evaluation.case import Case
-from firstfix.formats.map_server import load_map
-from firstfix.formats.recording import load_recording
+from firstfix.io.logs.load import load_recording
+from firstfix.io.maps.map_server import load_map
+from firstfix.lab.experiments.case import Case
 
 
 def find_cases(folders: Sequence[Path]) -> list[Case]:

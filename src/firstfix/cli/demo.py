@@ -15,7 +15,7 @@ from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
     from firstfix.core.grid import OccupancyGrid
-    from firstfix.evaluation.story import Act, Scene
+    from firstfix.lab.scenarios.episodes import Act, Scene
 
 FAILED = 1
 
@@ -51,7 +51,7 @@ def demo(
     well, 1 if it was not found, found in the wrong place, or lost. In rooms, and mostly in the
     corridor, that is so: these look the same everywhere.
     """
-    from firstfix.evaluation.figure import check_path
+    from firstfix.plots.figure import check_path
 
     picture = plot or Path("firstfix-demo.png")
     check_path(picture)
@@ -73,13 +73,13 @@ def demo(
 
 
 def _tell_story(grid: OccupancyGrid, seed: int, plot: Path) -> None:
-    from firstfix.evaluation.figure import can_draw
+    from firstfix.plots.figure import can_draw
 
     with working("preparing the map"):
         # The kernels too: what they take to compile is no part of the story.
-        from firstfix.cli.story import play, warm_up
-        from firstfix.evaluation.story import tell_acts
-        from firstfix.system.localizer import Localizer
+        from firstfix.lab.scenarios.demo_scenario import play, warm_up
+        from firstfix.lab.scenarios.episodes import tell_acts
+        from firstfix.localizer.localizer import Localizer
 
         warm_up()
     with working("the robot drives, and somebody is up to something"):
@@ -89,7 +89,7 @@ def _tell_story(grid: OccupancyGrid, seed: int, plot: Path) -> None:
         typer.echo(line)
     picture = "none, because matplotlib is missing: pip install 'firstfix[plot]'"
     if can_draw():
-        from firstfix.evaluation.story_picture import draw_story
+        from firstfix.lab.reports.scenario_picture import draw_story
 
         picture = f"{draw_story(grid, scenes, plot)}"
     typer.echo(f"Picture    {picture}")

@@ -45,7 +45,7 @@ VARIABLES = ("ROS_DOMAIN_ID", "RMW_IMPLEMENTATION", "ROS_LOCALHOST_ONLY", "CYCLO
 _PATIENCE_S = 1.0
 
 # In numba's words, raised where a kernel is declared.
-_UNKEPT = "no locator available"
+_UNKEPT = "no matcher available"
 
 
 def doctor(
@@ -150,17 +150,17 @@ def _tried_kernels() -> str:
 
     from firstfix.core.se2 import SE2
     from firstfix.fields.raycast import cast_ray_leaping
-    from firstfix.global_localization.locate import Locator
-    from firstfix.sim.lidar import Lidar
-    from firstfix.sim.world import identical_rooms
+    from firstfix.global_localization.scan_matcher import ScanMatcher
+    from firstfix.lab.simulation.lidar import Lidar
+    from firstfix.lab.worlds.catalog import identical_rooms
 
     start = time.perf_counter()
     grid = identical_rooms(1)
     scan = Lidar().scan(grid, SE2(2.0, 2.0, 0.5), np.random.default_rng(0))
-    locator = Locator(grid, cache_dir=None)
-    locator.locate(scan)
+    matcher = ScanMatcher(grid, cache_dir=None)
+    matcher.locate(scan)
     loaded = time.perf_counter() - start
-    result = locator.locate(scan)
+    result = matcher.locate(scan)
     return (
         f"ready after {loaded:.2f} s; then {result.elapsed_s:.3f} s a scan ({result.verdict.value})"
         f"; kept in {cast_ray_leaping.stats.cache_path}"
@@ -168,8 +168,8 @@ def _tried_kernels() -> str:
 
 
 def _map(path: Path) -> str:
-    from firstfix.formats.map_check import check_map
-    from firstfix.formats.map_server import load_map
+    from firstfix.io.maps.check import check_map
+    from firstfix.io.maps.map_server import load_map
 
     load_map(path)
     found = check_map(path)

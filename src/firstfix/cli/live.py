@@ -17,8 +17,8 @@ from firstfix.core.errors import InputError
 if TYPE_CHECKING:
     import socket
 
-    from firstfix.adapters.web.guard import Access
     from firstfix.core.grid import OccupancyGrid
+    from firstfix.web.guard import Access
 
 PORT = 8642
 
@@ -55,7 +55,7 @@ class Address:
         InputError
             If the token is missing or too short.
         """
-        from firstfix.adapters.web.guard import Access, is_loopback
+        from firstfix.web.guard import Access, is_loopback
 
         inside = is_loopback(self.host)
         if self.token is None and not inside:
@@ -103,13 +103,13 @@ def serve_simulated(
     InputError
         If it cannot be served there.
     """
-    from firstfix.adapters.sim_node import SimNode
-    from firstfix.adapters.sim_robot import SimRobot
-    from firstfix.adapters.web.feed import Feed
-    from firstfix.adapters.web.page import Page
-    from firstfix.adapters.web.server import listen, make_server
-    from firstfix.adapters.web.steering import Steering
     from firstfix.global_localization.answer import check_searchable
+    from firstfix.lab.live.simulated_node import SimNode
+    from firstfix.lab.live.steered_robot import SimRobot
+    from firstfix.web.feed import Feed
+    from firstfix.web.page import Page
+    from firstfix.web.server import listen, make_server
+    from firstfix.web.steering import Steering
 
     access = address.access()
     check_searchable(grid)
@@ -152,11 +152,11 @@ def serve_robot(robot: str, map_path: Path, arguments: list[str], address: Addre
     InputError
         If the map or an argument cannot be used, or the page cannot be served there.
     """
-    from firstfix.adapters.web.beside import PageBeside
-    from firstfix.adapters.web.server import listen
     from firstfix.cli.nodes import runner
-    from firstfix.formats.map_server import load_map
     from firstfix.global_localization.answer import check_searchable
+    from firstfix.io.maps.map_server import load_map
+    from firstfix.web.background_page import PageBeside
+    from firstfix.web.server import listen
 
     access, run = address.access(), runner(robot)
     check_searchable(load_map(map_path))  # what is wrong with it is told before anything is begun
@@ -168,7 +168,7 @@ def serve_robot(robot: str, map_path: Path, arguments: list[str], address: Addre
 
 def _tell(listening: socket.socket, access: Access) -> None:
     """Say where the page is, and show it where somebody is there to look at it."""
-    from firstfix.adapters.web.server import url_of
+    from firstfix.web.server import url_of
 
     url = url_of(listening) + ("" if access.token is None else f"#token={access.token}")
     typer.echo(f"Live page  {url}  (Ctrl-C ends)")

@@ -44,10 +44,10 @@ def locate(
     _check_options(index, every, plot)
     from firstfix.cli.answers import as_text
     from firstfix.core.estimate import Verdict
-    from firstfix.evaluation.answer import answer_document
-    from firstfix.evaluation.case import truth_at
-    from firstfix.formats.map_server import load_map
-    from firstfix.formats.recording import load_recording
+    from firstfix.io.answers import answer_document
+    from firstfix.io.logs.load import load_recording
+    from firstfix.io.maps.map_server import load_map
+    from firstfix.lab.experiments.case import truth_at
 
     grid = load_map(map_path)
     first = index or 0
@@ -59,21 +59,21 @@ def locate(
     with working("preparing the map"):
         # After the reading: input that cannot be used is told before the kernels are loaded.
         from firstfix.fields.cache import cache_folder
-        from firstfix.global_localization.locate import Locator
+        from firstfix.global_localization.scan_matcher import ScanMatcher
 
-        locator = Locator(grid, method=method, cache_dir=cache_folder())
+        matcher = ScanMatcher(grid, method=method, cache_dir=cache_folder())
     # On a terminal the answers themselves show how far it is.
     with progress(0 if sys.stdout.isatty() else len(chosen), "locating") as done:
         for i in chosen:
             truth = truth_at(recording, i)
-            result = locator.locate(recording.scans[i])
+            result = matcher.locate(recording.scans[i])
             if as_lines:
                 typer.echo(json.dumps(answer_document(i, result, truth), allow_nan=False))
             else:
                 typer.echo(f"{f'scan {i}: ' if every else ''}{as_text(result, truth)}")
             done(result.verdict.value)
     if plot is not None:
-        from firstfix.evaluation.picture import draw_answer
+        from firstfix.plots.answer_picture import draw_answer
 
         typer.echo(
             f"picture: {draw_answer(grid, recording.scans[i], result, plot, truth)}", err=True
@@ -90,7 +90,7 @@ def _check_options(index: int | None, every: bool, plot: Path | None) -> None:
             remedy="leave one of them out",
         )
     if plot is not None:
-        from firstfix.evaluation.figure import check_path, new_figure
+        from firstfix.plots.figure import check_path, new_figure
 
         check_path(plot)
         new_figure(1.0, 1.0)  # says now, not after the work, that matplotlib is missing

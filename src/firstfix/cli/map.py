@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from firstfix.cli import alike
+from firstfix.cli import map_aliasing as alike
 
 if TYPE_CHECKING:
-    from firstfix.formats.map_check import MapCheck
+    from firstfix.io.maps.check import MapCheck
 
 map_app = typer.Typer(help="Look at a map.", no_args_is_help=True)
 
@@ -31,8 +31,8 @@ def check(
 
     A simulated sensor takes one scan at random places, and each scan is located in the whole map.
     """
-    from firstfix.formats.map_check import check_map
-    from firstfix.formats.map_server import load_map
+    from firstfix.io.maps.check import check_map
+    from firstfix.io.maps.map_server import load_map
 
     lidar = alike.sensor(beams, fov, reach)
     found = check_map(map_path)
@@ -89,9 +89,9 @@ def show(
     seed: alike.Seed = 0,
 ) -> None:
     """Draw a map as firstfix sees it: walls, free and unknown space, in the map frame."""
-    from firstfix.evaluation.figure import check_path, new_figure
-    from firstfix.evaluation.picture import draw_grid
-    from firstfix.formats.map_server import load_map
+    from firstfix.io.maps.map_server import load_map
+    from firstfix.lab.reports.map_picture import draw_grid
+    from firstfix.plots.figure import check_path, new_figure
 
     target = plot or Path(f"firstfix-{map_path.resolve().stem}.png")
     check_path(target)

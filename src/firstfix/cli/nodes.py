@@ -14,9 +14,9 @@ import typer
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
-    from firstfix.adapters.node import MakeNode
-    from firstfix.adapters.ros_names import Names
-    from firstfix.system.node_config import NodeConfig
+    from firstfix.ros.names import Names
+    from firstfix.ros.node import MakeNode
+    from firstfix.ros.node_config import NodeConfig
 
 # What each node needs, and how to come by it.
 _VENV = "run firstfix in an environment made by `/usr/bin/python3 -m venv --system-site-packages`"
@@ -27,6 +27,12 @@ _NEEDED = {
         f"source /opt/ros/$ROS_DISTRO/setup.bash, and {_VENV}; or try `firstfix dds`",
     ),
     "dds": ("cyclonedds", "pip install 'firstfix[dds]'"),
+}
+
+_MODULES = {
+    "ros1": "firstfix.ros.ros1.node",
+    "ros2": "firstfix.ros.ros2.node",
+    "dds": "firstfix.ros.dds.participant",
 }
 
 # Whatever follows is for ROS.
@@ -85,7 +91,7 @@ def dds(
     `ROS_AUTOMATIC_DISCOVERY_RANGE`, `ROS_STATIC_PEERS`; and `CYCLONEDDS_URI`.
     """
     adapter = _load("dds")
-    from firstfix.adapters.ros_arguments import names_from, settings_from
+    from firstfix.ros.arguments import names_from, settings_from
 
     names = names_from(remap or [], name, namespace)
     options: dict[str, Any] = {"mode": mode, "base_frame_id": base_frame}
@@ -134,7 +140,7 @@ def runner(robot: str) -> Callable[[str, list[str], MakeNode], None]:
 
 def _settings_of(arguments: list[str], map_file: str) -> tuple[NodeConfig, Names]:
     """Read what follows ``--ros-args`` where no ROS reads it."""
-    from firstfix.adapters.ros_arguments import names_from, settings_from
+    from firstfix.ros.arguments import names_from, settings_from
 
     told: dict[str, list[str]] = {"-r": [], "-p": [], "--params-file": []}
     rest = [argument for argument in arguments if argument != "--ros-args"]
@@ -160,7 +166,7 @@ def _settings_of(arguments: list[str], map_file: str) -> tuple[NodeConfig, Names
 def _load(name: str) -> ModuleType:
     library, remedy = _NEEDED[name]
     try:
-        return importlib.import_module(f"firstfix.adapters.{name}")
+        return importlib.import_module(_MODULES[name])
     except ModuleNotFoundError as error:
         raise InputError(
             expected=f"{library} in this Python",

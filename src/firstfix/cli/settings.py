@@ -34,7 +34,7 @@ def load_config(params: Path | None, seed: int | None) -> AmclConfig:
 
     config = AmclConfig()
     if params is not None:
-        from firstfix.formats.amcl_yaml import load_amcl_config
+        from firstfix.io.parameters.amcl_yaml import load_amcl_config
 
         config = load_amcl_config(params)
     return config if seed is None else replace(config, random_seed=seed)

@@ -114,7 +114,7 @@ def choose_start(
     InputError
         If nobody knows where to begin, a saved pose must not be used, or it is outside the map.
     """
-    from firstfix.evaluation.track import GIVEN_START, TRUE_START, check_start
+    from firstfix.lab.experiments.drive_tracking import GIVEN_START, TRUE_START, check_start
 
     if said == SEARCH:
         start = Start(Origin.SEARCH, None, TRUE_START, "searching the whole map")
@@ -135,7 +135,7 @@ def choose_start(
 def _true(recording: Recording, *, is_asked_for: bool) -> Start:
     import numpy as np
 
-    from firstfix.evaluation.track import TRUE_START
+    from firstfix.lab.experiments.drive_tracking import TRUE_START
 
     if recording.truth is None or not np.isfinite(recording.truth).all(axis=1).any():
         raise InputError(
@@ -150,10 +150,10 @@ def _true(recording: Recording, *, is_asked_for: bool) -> Start:
 def _saved(path: Path, grid: OccupancyGrid, recording: Recording) -> Start:
     import math
 
-    from firstfix.evaluation.drive import known_odometry
-    from firstfix.evaluation.track import TRUE_START
-    from firstfix.formats.recalled_pose import recall
-    from firstfix.formats.saved_pose import load_pose, map_key
+    from firstfix.io.recalled_pose import recall
+    from firstfix.io.saved_pose import load_pose, map_key
+    from firstfix.lab.experiments.drive import known_odometry
+    from firstfix.lab.experiments.drive_tracking import TRUE_START
 
     saved = load_pose(path)
     index, T_odom_base = known_odometry(recording)[0]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from firstfix.core.errors import InputError
-from firstfix.formats.whole_files import write_whole
+from firstfix.io.atomic_files import write_whole
 
 
 def check_file(path: Path) -> None:
@@ -38,7 +38,7 @@ def check_folder(path: Path) -> None:
 
 def check_picture(path: Path) -> None:
     """Refuse a picture that could not be drawn, or not be written under this name."""
-    from firstfix.evaluation.figure import check_path
+    from firstfix.plots.figure import check_path
 
     check_path(path)
     check_plots()
@@ -46,7 +46,7 @@ def check_picture(path: Path) -> None:
 
 def check_plots() -> None:
     """Say now, not after the work, that matplotlib is missing."""
-    from firstfix.evaluation.figure import new_figure
+    from firstfix.plots.figure import new_figure
 
     new_figure(1.0, 1.0)
 

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from firstfix.amcl.config import AmclConfig
     from firstfix.core.grid import OccupancyGrid
     from firstfix.core.recording import Recording
-    from firstfix.evaluation.drive import Drive
-    from firstfix.evaluation.track import TrackedScan
-    from firstfix.formats.saved_pose import SavedPose
+    from firstfix.io.saved_pose import SavedPose
+    from firstfix.lab.experiments.drive import Drive
+    from firstfix.lab.experiments.drive_tracking import TrackedScan
 
 NO_ANSWER = 1
 
@@ -83,8 +83,8 @@ def track(
     """
     said = read_start(start)
     _check_targets(out, plot, keep_pose)
-    from firstfix.formats.map_server import load_map
-    from firstfix.formats.recording import load_recording
+    from firstfix.io.logs.load import load_recording
+    from firstfix.io.maps.map_server import load_map
 
     config = load_config(params, seed)
     grid = load_map(map_path)
@@ -94,9 +94,9 @@ def track(
     import numpy as np
 
     from firstfix.cli.track_answers import track_json, track_text, track_title, trajectory_of
-    from firstfix.evaluation.drive import known_odometry, plan_drive
-    from firstfix.evaluation.track import check_start, follow_drive, make_tracker
-    from firstfix.evaluation.track_metrics import summarize_track
+    from firstfix.lab.experiments.drive import known_odometry, plan_drive
+    from firstfix.lab.experiments.drive_tracking import check_start, follow_drive, make_tracker
+    from firstfix.lab.metrics.track_metrics import summarize_track
 
     known_odometry(recording)  # without it, no start would help
     begin = choose_start(said, grid, recording, config)
@@ -104,8 +104,8 @@ def track(
         typer.echo(f"note: {note}", err=True)
     keeper, key = None, ""
     if keep_pose is not None:
-        from firstfix.adapters.pose_keeper import PoseKeeper
-        from firstfix.formats.saved_pose import map_key
+        from firstfix.io.saved_pose import map_key
+        from firstfix.ros.pose_keeper import PoseKeeper
 
         keeper, key = PoseKeeper(keep_pose, config.save_pose_rate), map_key(grid)
     if begin.origin is Origin.SEARCH:
@@ -129,11 +129,11 @@ def track(
     if keeper is not None:
         keeper.save(_saved(tracked[-1], key))
     if out is not None:
-        from firstfix.formats.tum import save_tum
+        from firstfix.io.logs.tum import save_tum
 
         save_tum(out, trajectory_of(tracked))
     if plot is not None:
-        from firstfix.evaluation.track_picture import draw_track
+        from firstfix.lab.reports.track_picture import draw_track
 
         typer.echo(f"picture: {draw_track(grid, tracked, plot, track_title(figures))}", err=True)
     if as_object:
@@ -146,7 +146,7 @@ def track(
 def _searched(
     recording: Recording, grid: OccupancyGrid, config: AmclConfig
 ) -> tuple[Drive, list[TrackedScan]]:
-    from firstfix.cli.searched import NeverFoundError, search_and_follow
+    from firstfix.lab.experiments.searched_start import NeverFoundError, search_and_follow
 
     try:
         with progress(len(recording), "tracking") as done:
@@ -157,7 +157,7 @@ def _searched(
 
 
 def _saved(tracked: TrackedScan, map_key: str) -> SavedPose:
-    from firstfix.formats.saved_pose import SavedPose
+    from firstfix.io.saved_pose import SavedPose
 
     return SavedPose(
         T_map_base=tracked.T_map_base,

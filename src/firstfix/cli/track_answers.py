@@ -13,12 +13,12 @@ from firstfix.cli.answers import pose_text
 from firstfix.cli.start import Start
 from firstfix.core.se2 import SE2
 from firstfix.core.trajectory import Trajectory
-from firstfix.evaluation.drive import Drive
-from firstfix.evaluation.outcome import FOUND
-from firstfix.evaluation.track_metrics import RPE_PIECE_M, ErrorFigures, TrackFigures
+from firstfix.lab.experiments.drive import Drive
+from firstfix.lab.metrics.outcome import FOUND
+from firstfix.lab.metrics.track_metrics import RPE_PIECE_M, ErrorFigures, TrackFigures
 
 if TYPE_CHECKING:
-    from firstfix.evaluation.track import TrackedScan
+    from firstfix.lab.experiments.drive_tracking import TrackedScan
 
 
 def track_json(

@@ -62,8 +62,8 @@ def world_or_map(name: str) -> OccupancyGrid:
     InputError
         If it is neither, or the map cannot be used.
     """
-    from firstfix.formats.map_server import load_map
-    from firstfix.sim.world import WORLDS
+    from firstfix.io.maps.map_server import load_map
+    from firstfix.lab.worlds.catalog import WORLDS
 
     if name in WORLDS:
         return WORLDS[name]()

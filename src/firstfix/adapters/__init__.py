@@ -1,1 +1,0 @@
-"""Between the system and the world: convert, call, publish."""

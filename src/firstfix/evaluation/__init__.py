@@ -1,1 +1,0 @@
-"""Judging answers against the truth."""

@@ -1,0 +1,214 @@
+"""The conductor of the static stage: one scan in, one answer out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.estimate import Hypothesis, LocateResult, SearchReport, Verdict
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import MapFields, build_fields
+from firstfix.global_localization import exhaustive
+from firstfix.global_localization.answer import (
+    check_positions,
+    check_searchable,
+    nothing_to_match,
+    verified_place,
+)
+from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
+from firstfix.global_localization.config import LocateConfig, Method
+from firstfix.global_localization.places import distinct_places
+from firstfix.global_localization.refine import refine_on_field, refine_on_rays
+from firstfix.global_localization.scoring import examine, search_locally
+from firstfix.global_localization.search import search
+from firstfix.global_localization.verdict import judge, place_probabilities
+from firstfix.global_localization.verify import Verification, verify
+
+# A third of the beams sorts out most places; the rest is spent on those that stay.
+FIRST_LOOK_BEAMS = 60
+SECOND_LOOK_PLACES = 48
+
+# So many places are listed however unlikely, and all that are a hundredth as likely as the best.
+LISTED_PLACES = 10
+RIVAL_SHARE = 0.01
+
+
+class ScanMatcher:
+    """Finds scans in one map, anywhere, without a guess.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+    method : Method
+        How to search.
+    config : LocateConfig, optional
+        Settings of the default method.
+    cache_dir : Path, optional
+        Folder of prepared maps, such as `firstfix.fields.cache.cache_folder`; by default the map is
+        prepared anew.
+
+    Raises
+    ------
+    MapError
+        If the map has no wall, or no free space to be in.
+    """
+
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        *,
+        method: Method = Method.FAST,
+        config: LocateConfig | None = None,
+        cache_dir: Path | None = None,
+    ) -> None:
+        check_searchable(grid)
+        self.method = method
+        self.config = config or LocateConfig()
+        self.fields = build_fields(grid, cache_dir)
+        if method is Method.FAST:
+            check_positions(self.fields)
+        else:
+            _ = self.fields.pointscore  # part of the preparation, not of the first scan
+
+    def locate(self, scan: LaserScan) -> LocateResult:
+        """Find where in the map a scan was taken.
+
+        Parameters
+        ----------
+        scan : LaserScan
+            The scan, with the sensor's pose on the robot.
+
+        Returns
+        -------
+        LocateResult
+            Verdict and ranked hypotheses for ``T_map_base``.
+        """
+        if self.method is Method.FAST:
+            return locate(scan, self.fields, self.config)
+        poses = exhaustive.FAST if self.method is Method.PAPER else exhaustive.BASIC
+        return exhaustive.locate(scan, self.fields, poses)
+
+    def examine(self, scan: LaserScan, poses: Sequence[SE2]) -> tuple[Hypothesis, ...]:
+        """Tell how well a scan fits each of some poses: `firstfix.global_localization.scoring`.
+
+        Parameters
+        ----------
+        scan : LaserScan
+            The scan, with the sensor's pose on the robot.
+        poses : sequence of SE2
+            ``T_map_base`` proposed; at least one.
+
+        Returns
+        -------
+        tuple of Hypothesis
+            One for each pose; the probability is that of the place against a wrong map.
+        """
+        return examine(scan, poses, self.fields)
+
+    def search_locally(self, scan: LaserScan, T_map_base: SE2) -> Hypothesis:
+        """Find the best pose within about a metre and 40 degrees of a given one.
+
+        Parameters
+        ----------
+        scan : LaserScan
+            The scan, with the sensor's pose on the robot.
+        T_map_base : SE2
+            Where to look.
+
+        Returns
+        -------
+        Hypothesis
+            The best; its probability is that of the place against a wrong map.
+        """
+        return search_locally(scan, T_map_base, self.fields)
+
+
+def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateResult:
+    """Search, refine, verify, judge.
+
+    Parameters
+    ----------
+    scan : LaserScan
+        The scan, with the sensor's pose on the robot.
+    fields : MapFields
+        The prepared map.
+    config : LocateConfig
+        Settings.
+
+    Returns
+    -------
+    LocateResult
+        Verdict and ranked hypotheses for ``T_map_base``.
+    """
+    started = time.perf_counter()
+    resolution = fields.grid.resolution
+    beams = usable_beams(scan)
+    hits = int(np.count_nonzero(beams.hit))
+    if hits < FEWEST_HITS:
+        return nothing_to_match(scan, hits, FEWEST_HITS, time.perf_counter() - started)
+
+    candidates, report = search(beams, fields, config.shortlist, config.budget_s)
+    poses = refine_on_field(candidates.poses, beams, fields)
+    first_look = verify(poses, beams.thinned(FIRST_LOOK_BEAMS), fields)
+    poses = poses[distinct_places(poses, first_look.scores, resolution, SECOND_LOOK_PLACES)]
+    second_look = verify(poses, beams, fields)
+    ranked = distinct_places(poses, second_look.scores, resolution, config.hypotheses)
+    poses = poses[ranked[: worth_listing(second_look.scores[ranked], len(beams))]]
+    on_rays, covariances = refine_on_rays(poses, beams, fields)
+    # Rays are sharper, but in a map with smeared walls they can do harm: the better pose stays.
+    poses = np.concatenate([on_rays, poses])
+    covariances = np.concatenate([covariances, covariances])
+    verification = verify(poses, beams, fields)
+    ranked = distinct_places(poses, verification.scores, resolution, config.hypotheses)
+    probabilities = place_probabilities(verification.scores[ranked], len(beams))
+
+    hypotheses = tuple(
+        verified_place(fields.grid, scan, verification, int(i), covariances[i], float(probability))
+        for i, probability in zip(ranked, probabilities, strict=True)
+    )
+    verdict, reason = _judge(verification, ranked, probabilities, report, config)
+    return LocateResult(verdict, reason, hypotheses, report, time.perf_counter() - started)
+
+
+def worth_listing(scores: NDArray[np.float64], beams: int) -> int:
+    """Return how many of some ranked places a result should list.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (n,)
+        Mean cost of a beam at each place, best first, nats.
+    beams : int
+        Number of beams behind each mean.
+
+    Returns
+    -------
+    int
+        `LISTED_PLACES`, or more if more are a hundredth as likely as the best.
+    """
+    probabilities = place_probabilities(scores, beams)
+    rivals = int(np.count_nonzero(probabilities >= RIVAL_SHARE * probabilities[0]))
+    return max(LISTED_PLACES, rivals)
+
+
+def _judge(
+    verification: Verification,
+    ranked: NDArray[np.int64],
+    probabilities: NDArray[np.float64],
+    report: SearchReport,
+    config: LocateConfig,
+) -> tuple[Verdict, str]:
+    verdict, reason = judge(
+        probabilities, verification.evidence(int(ranked[0])), config.unique_probability
+    )
+    if report.proven:
+        return verdict, reason
+    # What was not searched may hold a better place: never sure of a place then.
+    unseen = f"; the time budget left {1.0 - report.searched:.0%} of the map unsearched"
+    return (Verdict.AMBIGUOUS if verdict is Verdict.UNIQUE else verdict), reason + unseen

@@ -1,0 +1,148 @@
+"""Judging poses that somebody else proposes, by the evidence of the static stage."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.angles import wrap
+from firstfix.core.estimate import Hypothesis
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.answer import to_cells, verified_place
+from firstfix.global_localization.beams import Beams, usable_beams
+from firstfix.global_localization.refine import refine_on_field, refine_on_rays
+from firstfix.global_localization.verdict import place_probabilities
+from firstfix.global_localization.verify import Verification, classes_of_beams, verify
+
+# Refinement may mend what a tracker leaves open, not find another place.
+_SAME_PLACE_M = 0.3
+_SAME_PLACE_RAD = math.radians(10.0)
+
+# The neighbourhood in which a slip is looked for. Refinement pulls in what is half a step off.
+_NEAR_M = 0.9
+_NEAR_STEP_M = 0.3
+_NEAR_RAD = math.radians(40.0)
+_NEAR_STEP_RAD = math.radians(10.0)
+_FIRST_LOOK_BEAMS = 60
+_SECOND_LOOK = 8
+
+
+def examine(scan: LaserScan, poses: Sequence[SE2], fields: MapFields) -> tuple[Hypothesis, ...]:
+    """Tell how well a scan fits each of some poses, allowing for small errors.
+
+    Parameters
+    ----------
+    scan : LaserScan
+        The scan, with the sensor's pose on the robot.
+    poses : sequence of SE2
+        ``T_map_base`` proposed; at least one.
+    fields : MapFields
+        The prepared map.
+
+    Returns
+    -------
+    tuple of Hypothesis
+        For each pose, in their order, the better one of itself and of where refinement takes it,
+        up to 0.3 m and 10 degrees away. The probability is that of the place against a wrong map,
+        as if there were no other. Covariances are zero.
+    """
+    beams = usable_beams(scan)
+    given = np.array([to_cells(fields.grid, scan, pose) for pose in poses])
+    refined = _held(refine_on_field(given, beams, fields), given, fields.grid.resolution)
+    verification = verify(np.concatenate([refined, given]), beams, fields)
+    unsaid = np.zeros((3, 3))
+    n = len(given)
+    better = np.where(
+        verification.scores[:n] < verification.scores[n:], np.arange(n), np.arange(n) + n
+    )
+    return tuple(
+        verified_place(fields.grid, scan, verification, i, unsaid, _alone(verification, i, beams))
+        for i in better.tolist()
+    )
+
+
+def search_locally(scan: LaserScan, T_map_base: SE2, fields: MapFields) -> Hypothesis:
+    """Find the best pose around a given one: within 0.9 m and 40 degrees, and what these pull in.
+
+    Parameters
+    ----------
+    scan : LaserScan
+        The scan, with the sensor's pose on the robot.
+    T_map_base : SE2
+        Where to look.
+    fields : MapFields
+        The prepared map.
+
+    Returns
+    -------
+    Hypothesis
+        The best, refined and with covariance. Its probability is that of the place against a wrong
+        map, as if there were no other.
+    """
+    beams = usable_beams(scan)
+    starts = np.array([to_cells(fields.grid, scan, T_map_base @ off) for off in _OFFSETS])
+    poses = refine_on_field(starts, beams, fields)
+    first = verify(poses, beams.thinned(_FIRST_LOOK_BEAMS), fields).scores
+    poses = poses[np.argsort(first, kind="stable")[:_SECOND_LOOK]]
+    best = poses[[int(np.argmin(verify(poses, beams, fields).scores))]]
+    on_rays, covariances = refine_on_rays(best, beams, fields)
+    verification = verify(np.concatenate([on_rays, best]), beams, fields)
+    i = int(np.argmin(verification.scores))
+    probability = _alone(verification, i, beams)
+    return verified_place(fields.grid, scan, verification, i, covariances[0], probability)
+
+
+def classify_beams(scan: LaserScan, T_map_base: SE2, fields: MapFields) -> NDArray[np.uint8]:
+    """Tell of each beam what the map says to it at a pose.
+
+    Parameters
+    ----------
+    scan : LaserScan
+        The scan, with the sensor's pose on the robot.
+    T_map_base : SE2
+        Where the robot is taken to be.
+    fields : MapFields
+        The prepared map.
+
+    Returns
+    -------
+    ndarray of uint8
+        For the beams of `usable_beams`, in their order: what
+        `firstfix.global_localization.verify.classes_of_beams` returns.
+    """
+    pose = to_cells(fields.grid, scan, T_map_base)
+    return classes_of_beams(pose, usable_beams(scan), fields)
+
+
+def _alone(verification: Verification, i: int, beams: Beams) -> float:
+    """Return the probability of a place against a wrong map, as if there were no other."""
+    return float(place_probabilities(verification.scores[[i]], len(beams))[0])
+
+
+def _held(
+    refined: NDArray[np.float64], given: NDArray[np.float64], resolution: float
+) -> NDArray[np.float64]:
+    """Take back refinements that went to another place."""
+    far = np.hypot(*(refined - given)[:, :2].T) * resolution > _SAME_PLACE_M
+    turned = np.abs(wrap(refined[:, 2] - given[:, 2])) > _SAME_PLACE_RAD
+    return np.where((far | turned)[:, None], given, refined)
+
+
+def _offsets() -> tuple[SE2, ...]:
+    steps = np.arange(-_NEAR_M, _NEAR_M + 1e-9, _NEAR_STEP_M)
+    turns = np.arange(-_NEAR_RAD, _NEAR_RAD + 1e-9, _NEAR_STEP_RAD)
+    return tuple(
+        SE2(float(x), float(y), float(turn))
+        for x in steps
+        for y in steps
+        if math.hypot(x, y) <= _NEAR_M
+        for turn in turns
+    )
+
+
+_OFFSETS = _offsets()

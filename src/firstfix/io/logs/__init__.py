@@ -1,0 +1,1 @@
+"""Recordings: bags, CARMEN logs, .npz, TUM trajectories."""

@@ -1,0 +1,187 @@
+"""Recordings from ROS 1 and ROS 2 bags."""
+
+from __future__ import annotations
+
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from firstfix.core.errors import ScanError
+from firstfix.core.recording import Recording
+from firstfix.core.scan import LaserScan
+from firstfix.core.trajectory import Trajectory
+from firstfix.io.logs.bag_file import ODOMETRY, SCAN, TRANSFORMS, BagFile
+from firstfix.io.logs.scan_errors import MAX_SCANS, check_max_scans, located, too_many_scans
+from firstfix.io.logs.stamps import SORTED_AHEAD, ascending, sorting_notes
+from firstfix.io.ros_messages.incoming import (
+    to_frame,
+    to_laser_scan,
+    to_odometry,
+    to_seconds,
+    to_transform,
+)
+from firstfix.io.ros_messages.sensor_place import SensorPlace, place_of, unknown_place
+from firstfix.io.ros_messages.tf_tree import TransformTree
+
+# How long after the last wanted scan its transforms are still looked for: they arrive later than
+# the scan, and odometry is interpolated.
+AFTER_LAST_SCAN_NS = 2_000_000_000
+
+
+class _Sweep(NamedTuple):
+    """A scan as it was recorded."""
+
+    time_ns: int
+    message: Any
+
+    @property
+    def stamp(self) -> float:
+        """Seconds; a driver that does not stamp its scans sends zero."""
+        return to_seconds(self.message.header.stamp) or 1e-9 * self.time_ns
+
+
+def load_bag(
+    path: str | Path, *, topic: str | None = None, max_scans: int | None = None
+) -> Recording:
+    """Read the scans of one topic, and the odometry, from a bag.
+
+    The base is ``base_link``, else ``base_footprint``, else the frame that odometry moves,
+    whichever the sensor is fixed to by transforms that do not change (on ``/tf_static`` or, as
+    in ROS 1, repeated on ``/tf``). If it is fixed to none, the base is the sensor, odometry is
+    left out, and a note says so. Odometry is the transform from an odometry frame on ``/tf``,
+    else ``nav_msgs/Odometry``. Poses that a localizer published are not taken for the truth.
+
+    Parameters
+    ----------
+    path : str or Path
+        A ``.bag``, ``.db3`` or ``.mcap`` file, or the folder of a ROS 2 bag.
+    topic : str or None
+        Topic of the scans; None for the only one, or ``scan`` of several.
+    max_scans : int or None
+        Only the first ones by stamp.
+
+    Returns
+    -------
+    Recording
+        Without truth; what had to be assumed is in its notes.
+
+    Raises
+    ------
+    ScanError
+        If the bag is damaged, the topic is not clear, or a scan is not one.
+    """
+    path = Path(path)
+    n_most = check_max_scans(max_scans)
+    with located(f"{path}"), BagFile(path) as bag:
+        topic = _scan_topic(bag, topic)
+        messages = islice(bag.messages(SCAN, [topic]), n_most + SORTED_AHEAD)
+        read = [_Sweep(*item) for item in messages]
+        if max_scans is None and len(read) > MAX_SCANS:
+            raise too_many_scans(path)
+        if not read:
+            raise _no_scan(topic)
+        order = ascending(np.array([sweep.stamp for sweep in read]))
+        sweeps = [read[i] for i in order[:n_most].tolist()]
+        until_ns = None
+        if len(sweeps) < len(read):
+            until_ns = max(sweep.time_ns for sweep in sweeps) + AFTER_LAST_SCAN_NS
+        tree = _transforms(bag, until_ns)
+        frames = sorted({to_frame(sweep.message.header.frame_id) for sweep in sweeps})
+        base, odometry, notes = _odometry(bag, tree, frames[0], until_ns)
+        places = {frame: _place(tree, base, frame, frames) for frame in frames}
+        return _recording(topic, sweeps, places, odometry, [*notes, *sorting_notes(order)])
+
+
+def _scan_topic(bag: BagFile, topic: str | None) -> str:
+    found = bag.topics_of(SCAN)
+    if topic is not None:
+        found = [name for name in found if name.strip("/") == topic.strip("/")]
+    elif len(found) > 1:
+        found = [name for name in found if name.strip("/") == "scan"]
+    if len(found) == 1:
+        return found[0]
+    listed = ", ".join(f"{name} ({kind})" for name, kind in bag.topics())
+    raise ScanError(
+        expected=f"a topic of {SCAN}" if topic is None else f"{SCAN} on the topic {topic}",
+        received=f"the topics {listed or '(none)'}",
+        remedy="name one topic of scans",
+    )
+
+
+def _no_scan(topic: str) -> ScanError:
+    return ScanError(
+        expected=f"scans on {topic}, as the index of the bag says",
+        received="none",
+        remedy="reindex the bag, or record it again",
+    )
+
+
+def _transforms(bag: BagFile, until_ns: int | None) -> TransformTree:
+    tree = TransformTree()
+    names = bag.topics_of(TRANSFORMS)
+    static = [name for name in names if name.endswith("tf_static")]
+    moving = [name for name in names if name not in static]
+    for some, end_ns in ((static, None), (moving, until_ns)):
+        for _, message in bag.messages(TRANSFORMS, some, until_ns=end_ns):
+            tree.add(map(to_transform, message.transforms))
+    return tree
+
+
+def _odometry(
+    bag: BagFile, tree: TransformTree, frame: str, until_ns: int | None
+) -> tuple[str | None, Trajectory | None, list[str]]:
+    base = tree.base_of(frame)
+    odometry = None if base is None else tree.odometry(base)
+    names = bag.topics_of(ODOMETRY)
+    if odometry is not None or not names:
+        return base, odometry, []
+    # Two filters on two topics may well write the same frames: their paths must not be mixed.
+    name = next((name for name in names if name.strip("/") == "odom"), names[0])
+    messages = bag.messages(ODOMETRY, [name], until_ns=until_ns)
+    tree.add_odometry(to_odometry(message) for _, message in messages)
+    base = tree.base_of(frame)
+    odometry = None if base is None else tree.odometry(base)
+    if odometry is None:
+        return base, None, [f"{name} does not tell of a frame that the sensor is fixed to"]
+    return base, odometry, [f"odometry is from {name}, because no transform tells of it"]
+
+
+def _place(tree: TransformTree, base: str | None, frame: str, frames: list[str]) -> SensorPlace:
+    T = None if base is None else tree.fixed(base, frame)
+    if T is not None:
+        return place_of(frame, T)
+    if len(frames) == 1:
+        return unknown_place(frame)
+    raise ScanError(
+        expected="scans of one sensor, or fixed transforms from one base to all of them",
+        received=f"scans in the frames {', '.join(frames)}",
+        remedy="choose another topic, or record the static transforms",
+    )
+
+
+def _recording(
+    topic: str,
+    sweeps: list[_Sweep],
+    places: dict[str, SensorPlace],
+    odometry: Trajectory | None,
+    notes: list[str],
+) -> Recording:
+    scans: list[LaserScan] = []
+    for i, sweep in enumerate(sweeps):
+        place = places[to_frame(sweep.message.header.frame_id)]
+        with located(f"scan {i} on {topic}"):
+            scans.append(
+                to_laser_scan(
+                    sweep.message,
+                    T_base_laser=place.T_base_laser,
+                    mounting=place.mounting,
+                    stamp=sweep.stamp,
+                )
+            )
+    unstamped = sum(to_seconds(sweep.message.header.stamp) == 0.0 for sweep in sweeps)
+    if unstamped:
+        notes = [*notes, f"{unstamped} scan(s) have no stamp: the time of recording was taken"]
+    placing = [note for place in places.values() for note in place.notes]
+    return Recording(scans=tuple(scans), odometry=odometry, notes=(*placing, *notes))

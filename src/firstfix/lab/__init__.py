@@ -1,0 +1,1 @@
+"""The laboratory: how good is it."""

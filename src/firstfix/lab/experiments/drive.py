@@ -1,0 +1,170 @@
+"""What of a recording can be followed, and where to begin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from firstfix.core.errors import ScanError
+from firstfix.core.recording import Recording
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.lab.experiments.case import truth_at
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """One scan of a drive, and what was known at its stamp.
+
+    Parameters
+    ----------
+    index : int
+        Of the scan in its recording.
+    scan : LaserScan
+        The scan.
+    T_odom_base : SE2
+        Odometry at its stamp.
+    truth : SE2 or None
+        ``T_map_base``; None where it is not known.
+    begin_at : SE2 or None
+        ``T_map_base`` at which to begin anew here; None to go on from the scan before.
+    same_run : bool
+        True if the robot has not been elsewhere since the scan before.
+    """
+
+    index: int
+    scan: LaserScan
+    T_odom_base: SE2
+    truth: SE2 | None
+    begin_at: SE2 | None
+    same_run: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """The scans of a recording that can be followed.
+
+    Parameters
+    ----------
+    sights : tuple of Sight
+        At least one, in the order of stamps; the first has a pose to begin at.
+    skipped : int
+        Scans left out: without odometry at their stamp, or before the first true pose.
+    notes : tuple of str
+        What was left out or assumed, in words, for a person.
+    """
+
+    sights: tuple[Sight, ...]
+    skipped: int
+    notes: tuple[str, ...]
+
+    @property
+    def begin_at(self) -> SE2:
+        """Where to begin, ``T_map_base`` at the first scan."""
+        pose = self.sights[0].begin_at
+        assert pose is not None  # noqa: S101 - said above; for the type checker
+        return pose
+
+
+def plan_drive(recording: Recording, start: SE2 | None) -> Drive:
+    """Decide which scans to follow and where to begin.
+
+    Between two runs of a recording the robot was elsewhere: a run begins at the true pose of its
+    first scan where that is known, else it goes on over the odometry of the gap.
+
+    Parameters
+    ----------
+    recording : Recording
+        Scans with odometry.
+    start : SE2 or None
+        ``T_map_base`` at the first scan that has odometry; None to begin at the first true pose.
+
+    Returns
+    -------
+    Drive
+        The scans, and what to know about them.
+
+    Raises
+    ------
+    ScanError
+        If no scan has odometry, or no true pose is known where one is asked for.
+    """
+    usable = known_odometry(recording)
+    first = usable[0][0] if start is not None else _first_true(recording, usable)
+    sights: list[Sight] = []
+    for index, T_odom_base in usable:
+        if index < first:
+            continue
+        truth = truth_at(recording, index)
+        before = sights[-1].index if sights else None
+        same_run = before is not None and _is_same_run(recording, before, index)
+        begin_at = None if same_run else truth
+        if before is None and start is not None:
+            begin_at = start
+        scan = recording.scans[index]
+        sights.append(Sight(index, scan, T_odom_base, truth, begin_at, same_run))
+    blind = len(recording) - len(usable)
+    return Drive(
+        sights=tuple(sights),
+        skipped=len(recording) - len(sights),
+        notes=_notes(sights, blind, len(usable) - len(sights)),
+    )
+
+
+def known_odometry(recording: Recording) -> list[tuple[int, SE2]]:
+    """Return index and ``T_odom_base`` of the scans at whose stamp there is odometry, at least one.
+
+    Raises
+    ------
+    ScanError
+        If there is none.
+    """
+    odometry = recording.odometry
+    if odometry is None:
+        why = "".join(f" ({note})" for note in recording.notes)
+        raise ScanError(
+            expected="a log with odometry",
+            received=f"one of scans alone{why}",
+            remedy="record /tf and /tf_static, or /odom, beside the scans "
+            "(.npz: an array `odom` [n, 3])",
+        )
+    known = [(i, odometry.at(scan.stamp)) for i, scan in enumerate(recording.scans)]
+    usable = [(i, T_odom_base) for i, T_odom_base in known if T_odom_base is not None]
+    if not usable:
+        scans = recording.scans
+        raise ScanError(
+            expected="odometry at the stamps of the scans",
+            received=f"scans from {scans[0].stamp:.3f} s to {scans[-1].stamp:.3f} s with odometry "
+            f"from {odometry.stamps[0]:.3f} s to {odometry.stamps[-1]:.3f} s",
+            remedy="record both by one clock (is use_sim_time set on one node only?)",
+        )
+    return usable
+
+
+def _first_true(recording: Recording, usable: list[tuple[int, SE2]]) -> int:
+    for index, _ in usable:
+        if truth_at(recording, index) is not None:
+            return index
+    raise ScanError(
+        expected="a log that knows true poses",
+        received="one that does not, at no scan with odometry",
+        remedy="give the pose to start at; `firstfix locate --json` finds it",
+    )
+
+
+def _is_same_run(recording: Recording, before: int, index: int) -> bool:
+    return recording.runs is None or bool(recording.runs[before] == recording.runs[index])
+
+
+def _notes(sights: list[Sight], blind: int, early: int) -> tuple[str, ...]:
+    new = [sight for sight in sights[1:] if not sight.same_run]
+    anew = sum(sight.begin_at is not None for sight in new)
+    counted = (
+        (blind, "scan(s) have no odometry at their stamp and are left out"),
+        (early, "scan(s) before the first true pose are left out"),
+        (anew, "further run(s) of the log begin anew at the true pose of their first scan"),
+        (
+            len(new) - anew,
+            "further run(s) begin without a true pose: tracked on over the odometry of the gap",
+        ),
+    )
+    return tuple(f"{count} {words}" for count, words in counted if count)

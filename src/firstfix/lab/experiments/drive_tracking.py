@@ -1,0 +1,154 @@
+"""Following a drive with the dynamic stage, scan by scan."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.amcl.config import AmclConfig
+from firstfix.amcl.initial import around_pose, free_poses
+from firstfix.amcl.sensor import build_sensor
+from firstfix.amcl.tracker import Track, Tracker
+from firstfix.core.errors import InputError
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.lab.experiments.drive import Drive, Sight
+
+
+def spread(sigma_m: float, sigma_deg: float) -> NDArray[np.float64]:
+    """Return the covariance of x (m), y (m), yaw (rad) for standard deviations in m and degrees."""
+    return np.diag([sigma_m**2, sigma_m**2, math.radians(sigma_deg) ** 2])
+
+
+# Poses of SLAM, which most "true" ones are, lie this close to the walls of a map.
+TRUE_START = spread(0.1, 5.0)
+# What Nav2 assumes of a pose that a person clicks.
+GIVEN_START = spread(0.5, 15.0)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TrackedScan:
+    """Where the robot was at a scan, and what it took to know.
+
+    Parameters
+    ----------
+    sight : Sight
+        The scan.
+    T_map_base : SE2
+        The tracked pose.
+    covariance : ndarray, shape (3, 3)
+        Of x (m), y (m), yaw (rad) in the map frame, at the last update.
+    T_map_odom : SE2
+        Drift of the odometry.
+    updated : bool
+        True if the scan was used; else the pose is that of the last update, moved by odometry.
+    particles : int
+        Number of particles after it.
+    elsewhere : float
+        Share of the belief that is not at this place, 0 to 1.
+    cpu_s : float
+        Processor time of this scan, s.
+    """
+
+    sight: Sight
+    T_map_base: SE2
+    covariance: NDArray[np.float64]
+    T_map_odom: SE2
+    updated: bool
+    particles: int
+    elsewhere: float
+    cpu_s: float
+
+
+def make_tracker(grid: OccupancyGrid, config: AmclConfig) -> Tracker:
+    """Prepare the dynamic stage for a map; recovery, if asked for, draws from all free space."""
+
+    def anywhere(_: LaserScan, n: int, rng: np.random.Generator) -> NDArray[np.float64]:
+        return free_poses(grid, n, rng)
+
+    return Tracker(build_sensor(grid, config), config, anywhere)
+
+
+def follow_drive(
+    drive: Drive,
+    tracker: Tracker,
+    config: AmclConfig,
+    start_covariance: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> Iterator[TrackedScan]:
+    """Follow a drive.
+
+    Parameters
+    ----------
+    drive : Drive
+        The scans, and where to begin.
+    tracker : Tracker
+        The dynamic stage for the map.
+    config : AmclConfig
+        Its settings; a belief begins with max_particles.
+    start_covariance : ndarray, shape (3, 3)
+        Of the first start, x (m), y (m), yaw (rad); later ones are at true poses: `TRUE_START`.
+    rng : numpy.random.Generator
+        Source of randomness.
+
+    Yields
+    ------
+    TrackedScan
+        One for each scan of the drive.
+    """
+    track: Track | None = None
+    covariance = start_covariance
+    for sight in drive.sights:
+        T_odom_base, scan, before = sight.T_odom_base, sight.scan, track
+        cpu = time.thread_time()
+        if sight.begin_at is not None:
+            particles = around_pose(sight.begin_at, covariance, config.max_particles, rng)
+            track = tracker.begin(particles, T_odom_base, scan, rng)
+            covariance = TRUE_START
+        else:
+            assert track is not None  # noqa: S101 - the first scan of a drive has a start
+            track = tracker.follow(track, T_odom_base, scan, rng)
+        cpu_s = time.thread_time() - cpu
+        yield _tracked(sight, track, cpu_s, is_new=track is not before)
+
+
+def check_start(grid: OccupancyGrid, T_map_base: SE2) -> None:
+    """Refuse a start outside the map, from where nothing can be followed.
+
+    Raises
+    ------
+    InputError
+        If it is outside.
+    """
+    column, row = grid.to_cells(np.array([T_map_base.x, T_map_base.y])).tolist()
+    if 0.0 <= column < grid.width and 0.0 <= row < grid.height:
+        return
+    size = np.array([grid.width, grid.height]) * grid.resolution
+    corners = grid.T_map_grid.apply(np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * size)
+    (west, south), (east, north) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    raise InputError(
+        expected=f"a start in the map, x {west:.2f} to {east:.2f} m, "
+        f"y {south:.2f} to {north:.2f} m",
+        received=f"x {T_map_base.x:.2f} m, y {T_map_base.y:.2f} m",
+        remedy="check the pose, and that map and log are of one building",
+    )
+
+
+def _tracked(sight: Sight, track: Track, cpu_s: float, *, is_new: bool) -> TrackedScan:
+    T_map_odom = track.T_map_odom
+    return TrackedScan(
+        sight=sight,
+        T_map_base=T_map_odom @ sight.T_odom_base,
+        covariance=track.state.estimate.covariance,
+        T_map_odom=T_map_odom,
+        updated=is_new,
+        particles=len(track.state.particles),
+        elsewhere=track.state.elsewhere,
+        cpu_s=cpu_s,
+    )

@@ -1,0 +1,94 @@
+"""Which places of a map look alike to a sensor: scans from known places, and what came of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from firstfix.core.estimate import Hypothesis, LocateResult, Verdict
+from firstfix.core.pose_error import PoseError
+from firstfix.core.se2 import SE2
+from firstfix.lab.metrics.outcome import FOUND
+
+# A rival less likely than this is not what made the verdict AMBIGUOUS.
+PLAUSIBLE = 0.05
+
+
+class Look(Enum):
+    """What one scan tells at a place."""
+
+    FOUND = "UNIQUE and right"
+    ALIKE = "AMBIGUOUS"
+    LOST = "NO_MATCH"
+    MISTAKEN = "UNIQUE but wrong"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Place:
+    """A place of the map, and what a scan from it was taken for.
+
+    Parameters
+    ----------
+    pose : SE2
+        ``T_map_base`` of the scan.
+    look : Look
+        What the scan tells.
+    double : Hypothesis or None
+        The most likely other place; None if there is no plausible one.
+    """
+
+    pose: SE2
+    look: Look
+    double: Hypothesis | None
+
+
+def look_from(pose: SE2, result: LocateResult) -> Place:
+    """Compare where a scan was taken with where it was found.
+
+    Parameters
+    ----------
+    pose : SE2
+        ``T_map_base`` of the scan.
+    result : LocateResult
+        The answer to it.
+
+    Returns
+    -------
+    Place
+        The place, and its double.
+    """
+    others = [
+        hypothesis
+        for hypothesis in result.hypotheses
+        if hypothesis.probability >= PLAUSIBLE and not _is_at(pose, hypothesis)
+    ]
+    return Place(pose, _look(pose, result), others[0] if others else None)
+
+
+def share(places: Sequence[Place], look: Look) -> float:
+    """Return the share of places that look so, 0 to 1."""
+    return sum(place.look is look for place in places) / max(1, len(places))
+
+
+def doubles(places: Sequence[Place]) -> list[tuple[SE2, Hypothesis]]:
+    """List ambiguous or mistaken places with what they were taken for, most likely first."""
+    pairs = [
+        (place.pose, place.double)
+        for place in places
+        if place.double is not None and place.look in (Look.ALIKE, Look.MISTAKEN)
+    ]
+    return sorted(pairs, key=lambda pair: -pair[1].probability)
+
+
+def _look(pose: SE2, result: LocateResult) -> Look:
+    best = result.best
+    if best is None or result.verdict is Verdict.NO_MATCH:
+        return Look.LOST
+    if result.verdict is Verdict.AMBIGUOUS:
+        return Look.ALIKE
+    return Look.FOUND if _is_at(pose, best) else Look.MISTAKEN
+
+
+def _is_at(pose: SE2, hypothesis: Hypothesis) -> bool:
+    return PoseError.between(hypothesis.pose, pose).is_within(FOUND)

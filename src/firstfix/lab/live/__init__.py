@@ -1,0 +1,1 @@
+"""A simulated robot that people steer on the live page."""

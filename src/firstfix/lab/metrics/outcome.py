@@ -1,0 +1,90 @@
+"""What came of one scan, compared with the truth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from firstfix.core.estimate import LocateResult, Verdict
+from firstfix.core.pose_error import PoseError
+from firstfix.core.se2 import SE2
+
+NO_POSE = PoseError(math.inf, math.inf)
+FOUND = PoseError(0.5, math.radians(10.0))
+FOUND_WELL = PoseError(0.2, math.radians(3.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of one scan.
+
+    Parameters
+    ----------
+    index : int
+        Index of the scan in its recording.
+    verdict : Verdict
+        What the method said.
+    error : PoseError
+        Of the best hypothesis.
+    rank : int or None
+        Rank of the first hypothesis within `FOUND` of the truth, from 1; None if there is none.
+    cpu_s, wall_s : float
+        Processor and wall time of ``locate``, s.
+    probability : float
+        That was claimed for the best hypothesis, 0 to 1; 0 if there is none.
+    """
+
+    index: int
+    verdict: Verdict
+    error: PoseError
+    rank: int | None
+    cpu_s: float
+    wall_s: float
+    probability: float
+
+    @property
+    def is_found(self) -> bool:
+        """True if the best hypothesis is within `FOUND` of the truth, whatever the verdict."""
+        return self.error.is_within(FOUND)
+
+
+def is_found(pose: SE2, truth: SE2 | None) -> bool:
+    """Tell whether a pose is within `FOUND` of the truth; False where the truth is not known."""
+    return truth is not None and PoseError.between(pose, truth).is_within(FOUND)
+
+
+def judge(result: LocateResult, truth: SE2, *, index: int, cpu_s: float, wall_s: float) -> Outcome:
+    """Compare an answer with the truth, whatever its verdict.
+
+    Parameters
+    ----------
+    result : LocateResult
+        The answer.
+    truth : SE2
+        ``T_map_base``.
+    index : int
+        Index of the scan.
+    cpu_s, wall_s : float
+        What the answer took, s.
+
+    Returns
+    -------
+    Outcome
+        The scan in figures.
+    """
+    errors = [PoseError.between(hypothesis.pose, truth) for hypothesis in result.hypotheses]
+    ranks = [rank for rank, error in enumerate(errors, 1) if error.is_within(FOUND)]
+    return Outcome(
+        index,
+        result.verdict,
+        errors[0] if errors else NO_POSE,
+        ranks[0] if ranks else None,
+        cpu_s,
+        wall_s,
+        best_probability(result),
+    )
+
+
+def best_probability(result: LocateResult) -> float:
+    """Return the probability of the best hypothesis; 0 if there is none."""
+    return result.best.probability if result.best is not None else 0.0

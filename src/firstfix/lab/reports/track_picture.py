@@ -1,0 +1,127 @@
+"""A picture of a tracked drive: a track that leaves the walls is seen at a glance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.se2 import SE2
+from firstfix.lab.experiments.drive_tracking import TrackedScan
+from firstfix.plots.figure import BLUE, GREEN, ORANGE, RED, SKY, new_figure, save_figure
+from firstfix.plots.map_image import draw_map
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Enough for a closed outline of what was seen; more would hide the map.
+MOST_SCANS = 200
+MOST_POINTS = 40_000
+
+LONG_SIDE_IN, LEAST_SIDE_IN = 14.0, 5.0
+LETTERING_IN = 1.0  # title, axis and legend
+MARGIN_M = 1.0
+
+
+def draw_track(grid: OccupancyGrid, tracked: Sequence[TrackedScan], path: Path, title: str) -> Path:
+    """Draw a tracked drive into a file.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+    tracked : sequence of TrackedScan
+        At least one.
+    path : Path
+        Where the picture goes; its suffix names the format: .png, .svg or .pdf.
+    title : str
+        What stands above it.
+
+    Returns
+    -------
+    Path
+        The file, absolute.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written, or matplotlib is not installed.
+    """
+    track = np.array([scan.T_map_base.as_array()[:2] for scan in tracked])
+    points = end_points(tracked)
+    west, south, east, north = _view(np.concatenate([track, points]), track)
+    scale = LONG_SIDE_IN / max(east - west, north - south)
+    width = max(LEAST_SIDE_IN, scale * (east - west))
+    height = max(LEAST_SIDE_IN, scale * (north - south)) + LETTERING_IN
+    figure = new_figure(width, height)
+    axes = figure.subplots()
+    draw_map(axes, grid)
+    if len(points):
+        axes.scatter(
+            points[:, 0], points[:, 1], s=2.5, color=SKY, lw=0, alpha=0.7, zorder=2,
+            label="end points of the scans, where they were tracked",
+        )  # fmt: skip
+    _draw_paths(axes, tracked)
+    axes.plot(*track[0], "o", color=GREEN, ms=9, mec="white", zorder=7, label="start")
+    axes.plot(*track[-1], "s", color=RED, ms=9, mec="white", zorder=7, label="end")
+    axes.set(xlim=(west, east), ylim=(south, north), title=title)
+    legend = figure.legend(loc="outside lower center", ncols=6)
+    for handle in legend.legend_handles:
+        if handle is not None and hasattr(handle, "set_sizes"):
+            handle.set_sizes([30.0])  # the points themselves are too small for a legend
+    return save_figure(figure, path)
+
+
+def end_points(tracked: Sequence[TrackedScan]) -> NDArray[np.float64]:
+    """Return end points of evenly chosen scans at their tracked poses, shape (n, 2), m, map."""
+    chosen = tracked[:: math.ceil(len(tracked) / MOST_SCANS)]
+    points = np.concatenate([scan.T_map_base.apply(scan.sight.scan.points()) for scan in chosen])
+    kept: NDArray[np.float64] = points[:: max(1, math.ceil(len(points) / MOST_POINTS))]
+    return kept
+
+
+def anchored_odometry(tracked: Sequence[TrackedScan]) -> list[SE2]:
+    """Return where odometry alone would have led, from each start on (``T_map_base``)."""
+    poses = []
+    T_map_odom = tracked[0].T_map_odom
+    for scan in tracked:
+        if scan.sight.begin_at is not None:
+            T_map_odom = scan.T_map_odom
+        poses.append(T_map_odom @ scan.sight.T_odom_base)
+    return poses
+
+
+def _draw_paths(axes: Axes, tracked: Sequence[TrackedScan]) -> None:
+    breaks = [i for i, scan in enumerate(tracked) if not scan.sight.same_run and i > 0]
+    odometry = _xy(anchored_odometry(tracked))
+    truth = _xy([scan.sight.truth for scan in tracked])
+    track = _xy([scan.T_map_base for scan in tracked])
+    for poses, colour, width, label in (
+        (odometry, ORANGE, 0.8, "odometry alone"),
+        (truth, "black", 2.2, "truth"),
+        (track, BLUE, 1.2, "tracked"),
+    ):
+        if np.isfinite(poses).any():
+            # A row of NaN ends a line: nobody drove across a gap.
+            x, y = np.insert(poses, breaks, np.nan, axis=0).T
+            axes.plot(x, y, color=colour, lw=width, label=label, zorder=3)
+
+
+def _xy(poses: Sequence[SE2 | None]) -> NDArray[np.float64]:
+    return np.array([(math.nan, math.nan) if p is None else (p.x, p.y) for p in poses])
+
+
+def _view(
+    seen: NDArray[np.float64], track: NDArray[np.float64]
+) -> tuple[float, float, float, float]:
+    """Return west, south, east and north of what to show, m: the track, and most of what it saw."""
+    # A few stray far returns must not shrink the building to a stamp.
+    low = np.minimum(np.percentile(seen, 1, axis=0), track.min(axis=0)) - MARGIN_M
+    high = np.maximum(np.percentile(seen, 99, axis=0), track.max(axis=0)) + MARGIN_M
+    (west, south), (east, north) = low.tolist(), high.tolist()
+    return west, south, east, north

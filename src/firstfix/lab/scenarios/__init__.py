@@ -1,0 +1,1 @@
+"""Scripts of what happens to a robot."""

@@ -1,0 +1,172 @@
+"""What is done to a robot: kidnapped, carried, pushed, or on a floor where its wheels slip."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.errors import InputError
+from firstfix.core.se2 import SE2
+from firstfix.lab.scenarios.phase import Phase, periods
+from firstfix.lab.simulation.simulation import ODOMETRY_HZ, PERIOD_S, Disturbance, Moment, Stage
+from firstfix.lab.simulation.sweep import NOBODY
+from firstfix.lab.worlds.catalog import random_free_pose
+
+_SWAY_RAD = 1.5  # how far a robot turns to and fro in somebody's hands
+
+
+class Grip(Enum):
+    """What the sensor of a carried robot sees of who carries it."""
+
+    OPEN = "open"  # nothing: it is held from below
+    HANDS = "hands"  # two hands, and a body behind
+    COVERED = "covered"  # something near, whichever way it looks
+
+
+@dataclass(frozen=True, slots=True)
+class Teleport(Phase):
+    """The robot is somewhere else all of a sudden, and neither wheels nor signals say so.
+
+    Parameters
+    ----------
+    to : SE2 or None
+        ``T_map_base`` afterwards; None for a random free place.
+    """
+
+    to: SE2 | None = None
+
+    @property
+    def places(self) -> tuple[SE2, ...]:
+        """Where it will be."""
+        return () if self.to is None else (self.to,)
+
+    def play(self, stage: Stage) -> Iterator[Moment]:
+        """Move it between two scans."""
+        stage.robot.place(_somewhere(stage) if self.to is None else self.to)
+        stage.disturbed(Disturbance.TELEPORTED)
+        yield from ()
+
+
+@dataclass(frozen=True, slots=True)
+class CarryTo(Phase):
+    """Somebody lifts the robot, carries it to a place and sets it down.
+
+    Its wheels drop and count nothing. It turns to and fro on the way: the one that it would drive,
+    or a straight one if it could not.
+
+    Parameters
+    ----------
+    to : SE2 or None
+        ``T_map_base`` afterwards; None for a random free place.
+    seconds : float
+        How long it is off the floor, s, at least one scan.
+    grip : Grip
+        What its sensor sees meanwhile.
+    """
+
+    to: SE2 | None = None
+    seconds: float = 5.0
+    grip: Grip = Grip.HANDS
+
+    @property
+    def places(self) -> tuple[SE2, ...]:
+        """Where it will be."""
+        return () if self.to is None else (self.to,)
+
+    def play(self, stage: Stage) -> Iterator[Moment]:
+        """Lift, carry, set down."""
+        robot = stage.robot
+        start, goal = robot.T_map_base, _somewhere(stage) if self.to is None else self.to
+        way = _way(stage, start, goal)
+        lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))])
+        steps = max(1, periods(self.seconds))
+        sway = stage.rng.uniform(-_SWAY_RAD, _SWAY_RAD, 2)
+        turn = (start.inverse() @ goal).yaw
+        robot.lift()
+        for i in range(steps):
+            share = i / steps
+            x, y = (float(np.interp(share * lengths[-1], lengths, side)) for side in way.T)
+            to_and_fro = float(sway @ np.sin(share * math.pi * np.array([2.0, 5.0])))
+            robot.place(SE2(x, y, start.yaw + share * turn + to_and_fro))
+            yield stage.moment("carry", hands=_HANDS[self.grip])
+        robot.place(goal)
+        robot.set_down()
+        stage.disturbed(Disturbance.CARRIED)
+
+
+class SlipKind(Enum):
+    """Which of the two, robot and wheels, moved without the other."""
+
+    PUSHED = "pushed"  # the robot, aside or ahead, until it meets a wall
+    SPINNING = "spinning"  # the wheels, forwards
+
+
+@dataclass(frozen=True, slots=True)
+class Slip(Phase):
+    """Odometry and motion part: somebody kicks the robot, or its wheels turn on the spot.
+
+    Parameters
+    ----------
+    metres, degrees : float
+        How far they part.
+    kind : SlipKind
+        Which of the two moved.
+    seconds : float
+        How long this takes, s, at least one scan.
+    """
+
+    metres: float = 0.5
+    degrees: float = 20.0
+    kind: SlipKind = SlipKind.PUSHED
+    seconds: float = 0.5
+
+    def play(self, stage: Stage) -> Iterator[Moment]:
+        """Slip a little with every tick."""
+        steps = max(1, periods(self.seconds))
+        ticks = round(steps * PERIOD_S * ODOMETRY_HZ)
+        length, turn = self.metres / ticks, math.radians(self.degrees) / ticks
+        bearing = float(stage.rng.uniform(-math.pi, math.pi))
+
+        def tick(T_map_base: SE2) -> tuple[float, float]:
+            if self.kind is SlipKind.SPINNING:
+                stage.robot.spin_wheels(length, turn)
+            else:
+                # The robot turns while it slides; the foot that pushes does not.
+                aside = bearing - T_map_base.yaw
+                stage.robot.push(SE2(length * math.cos(aside), length * math.sin(aside), turn))
+            return 0.0, 0.0
+
+        for _ in range(steps):
+            yield stage.moment("slip", tick)
+        pushed = self.kind is SlipKind.PUSHED
+        stage.disturbed(Disturbance.PUSHED if pushed else Disturbance.SLIPPED)
+
+
+def _ring() -> NDArray[np.float64]:
+    bearings = np.arange(12) * (math.pi / 6.0)
+    # Wide enough to leave no gap at 0.3 m; the base's middle is not the sensor's.
+    return np.column_stack([0.3 * np.cos(bearings), 0.3 * np.sin(bearings), np.full(12, 0.1)])
+
+
+# Circles beside the robot: x, y in the base frame, radius; m.
+_HANDS: dict[Grip, NDArray[np.float64]] = {
+    Grip.OPEN: NOBODY,
+    Grip.HANDS: np.array([[0.0, 0.2, 0.05], [0.0, -0.2, 0.05], [-0.4, 0.0, 0.2]]),
+    Grip.COVERED: _ring(),
+}
+
+
+def _somewhere(stage: Stage) -> SE2:
+    return random_free_pose(stage.floor.grid, stage.rng)
+
+
+def _way(stage: Stage, start: SE2, goal: SE2) -> NDArray[np.float64]:
+    try:
+        return stage.planner.path(start, goal)
+    except InputError:  # over a wall, then
+        return np.array([[start.x, start.y], [goal.x, goal.y]])

@@ -1,0 +1,161 @@
+"""What a robot does: it stands, drives, turns, with or without people about it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from firstfix.core.se2 import SE2
+from firstfix.lab.scenarios.phase import Phase, periods
+from firstfix.lab.simulation.people import Manner
+from firstfix.lab.simulation.pilot import Pilot
+from firstfix.lab.simulation.simulation import PERIOD_S, Moment, Stage
+
+_BACK_OFF_MPS = -0.15
+_BACK_OFF_S = 1.0
+_SPIN_RADPS = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Stand(Phase):
+    """The robot stands still.
+
+    Parameters
+    ----------
+    seconds : float
+        How long, s.
+    """
+
+    seconds: float
+
+    def play(self, stage: Stage) -> Iterator[Moment]:
+        """Stand."""
+        for _ in range(periods(self.seconds)):
+            yield stage.moment("stand")
+
+
+@dataclass(frozen=True, slots=True)
+class Pause(Phase):
+    """The robot stands still and reports nothing: time passes without a scan or odometry.
+
+    Parameters
+    ----------
+    seconds : float
+        How long, s.
+    """
+
+    seconds: float
+
+    def play(self, stage: Stage) -> Iterator[Moment]:
+        """Be silent."""
+        for _ in range(periods(self.seconds)):
+            yield stage.silence("pause")
+
+
+@dataclass(frozen=True, slots=True)
+class DriveTo(Phase):
+    """The robot drives to a goal along a planned way and stops there.
+
+    Parameters
+    ----------
+    to : SE2 or None
+        The goal in the map frame (its heading does not count); None for a random one that can be
+        reached.
+    seconds : float
+        When to give up, s.
+    """
+
+    to: SE2 | None = None
+    seconds: float = 300.0
+
+    @property
+    def places(self) -> tuple[SE2, ...]:
+        """The goal."""
+        return () if self.to is None else (self.to,)
+
+    def play(self, stage: Stage) -> Iterator[Moment]:
+        """Drive; after a bump go back a little and plan anew."""
+        here = stage.robot.T_map_base
+        goal = stage.planner.random_goal(here, stage.rng) if self.to is None else self.to
+        pilot = Pilot(stage.planner.path(here, goal))
+        back_off = 0
+        for _ in range(periods(self.seconds)):
+            if pilot.arrived:
+                break
+            if back_off == 0 and stage.robot.bumped:
+                back_off = periods(_BACK_OFF_S)
+            if back_off == 0:
+                yield stage.moment("drive", pilot.command)
+                continue
+            yield stage.moment("drive", lambda _: (_BACK_OFF_MPS, 0.0))
+            back_off -= 1
+            if back_off == 0:
+                pilot = Pilot(stage.planner.path(stage.robot.T_map_base, goal))
+
+
+@dataclass(frozen=True, slots=True)
+class Wander(Phase):
+    """The robot drives from one random goal to the next.
+
+    Parameters
+    ----------
+    seconds : float
+        How long, s.
+    """
+
+    seconds: float
+
+    def play(self, stage: Stage) -> Iterator[Moment]:
+        """Drive until time is over."""
+        end = stage.stamp + self.seconds - PERIOD_S / 2.0
+        while stage.stamp < end:
+            before = stage.stamp
+            yield from DriveTo(seconds=end - before).play(stage)
+            if stage.stamp == before:  # in a nook, where every goal is at hand
+                yield stage.moment("drive")
+
+
+@dataclass(frozen=True, slots=True)
+class Spin(Phase):
+    """The robot turns on the spot.
+
+    Parameters
+    ----------
+    radians : float
+        How far, rad; positive is to the left, and more than a full turn is fine.
+    """
+
+    radians: float
+
+    def play(self, stage: Stage) -> Iterator[Moment]:
+        """Turn at a steady speed, and stop."""
+        turn = math.copysign(_SPIN_RADPS, self.radians)
+        for _ in range(periods(abs(self.radians) / _SPIN_RADPS)):
+            yield stage.moment("spin", lambda _: (0.0, turn))
+        yield stage.moment("spin")
+
+
+@dataclass(frozen=True, slots=True)
+class Crowd(Phase):
+    """People come to the robot, which stands still for a while, and stay until the next crowd.
+
+    Parameters
+    ----------
+    count : int
+        How many; 0 sends all away. Fewer come where there is no place for so many.
+    seconds : float
+        How long the robot stands, s; with 0 the next phase has the crowd about it at once.
+    manner : Manner
+        Whether they surround it and go with it, or walk about.
+    """
+
+    count: int
+    seconds: float = 0.0
+    manner: Manner = Manner.SURROUND
+
+    def play(self, stage: Stage) -> Iterator[Moment]:
+        """Let them come and stand among them."""
+        stage.people.come(self.count, self.manner, stage.robot.T_map_base)
+        for _ in range(periods(self.seconds)):
+            yield stage.moment("crowd")

@@ -1,0 +1,27 @@
+"""What every part of a scenario is."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+
+from firstfix.core.se2 import SE2
+from firstfix.lab.simulation.simulation import PERIOD_S, Moment, Stage
+
+
+class Phase(ABC):
+    """A part of a scenario."""
+
+    @abstractmethod
+    def play(self, stage: Stage) -> Iterator[Moment]:
+        """Move the stage on to the end of the phase, scan by scan; a phase may take no time."""
+
+    @property
+    def places(self) -> tuple[SE2, ...]:
+        """Where the robot will stand because the script says so: no furniture comes there."""
+        return ()
+
+
+def periods(seconds: float) -> int:
+    """Return how many scans are taken in a time (s)."""
+    return round(seconds / PERIOD_S)

@@ -1,0 +1,129 @@
+"""Scripts of what happens to a robot, and what it reports meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from firstfix.core.errors import InputError
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.se2 import SE2
+from firstfix.lab.scenarios.phases import Phase
+from firstfix.lab.simulation.floor import Floor
+from firstfix.lab.simulation.furniture import furnished
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.simulation.robot import Kobuki
+from firstfix.lab.simulation.simulation import Moment, Shutter, Stage
+from firstfix.lab.worlds.catalog import random_free_pose
+
+
+def _usual_lidar() -> Lidar:
+    return Lidar(dropout=0.01, T_base_laser=SE2(0.07, 0.0, 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """A script; with a map and a seed it always plays the same.
+
+    Parameters
+    ----------
+    phases : sequence of Phase
+        What happens, one after another.
+    start : SE2 or None
+        ``T_map_base`` at first; None for a random free place.
+    kobuki : Kobuki
+        The robot.
+    lidar : Lidar
+        Its sensor, a few centimetres before its middle by default.
+    shutter : Shutter
+        Whether motion skews its scans.
+    furniture : int
+        Boxes in the building that are not in the map.
+    """
+
+    phases: Sequence[Phase]
+    start: SE2 | None = None
+    kobuki: Kobuki = field(default_factory=Kobuki)
+    lidar: Lidar = field(default_factory=_usual_lidar)
+    shutter: Shutter = Shutter.AT_ONCE
+    furniture: int = 0
+
+
+def run(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Iterator[Moment]:
+    """Play a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The script.
+    grid : OccupancyGrid
+        The map of the building.
+    seed : int
+        Where chance begins.
+
+    Yields
+    ------
+    Moment
+        One for every scan, 10 a second.
+
+    Raises
+    ------
+    InputError
+        If the robot shall begin, or be put, where it does not fit, or drive where no way leads.
+    """
+    stage = set_stage(scenario, grid, seed)
+    for phase in scenario.phases:
+        yield from phase.play(stage)
+
+
+def set_stage(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Stage:
+    """Prepare a scenario: the robot stands at its beginning, and nothing has happened yet.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The script; its phases tell where there must be no furniture.
+    grid : OccupancyGrid
+        The map of the building.
+    seed : int
+        Where chance begins.
+
+    Returns
+    -------
+    Stage
+        Ready to be played on.
+
+    Raises
+    ------
+    InputError
+        As `run`.
+    """
+    for_building, for_stage = np.random.SeedSequence(seed).spawn(2)
+    rng = np.random.default_rng(for_building)
+    start = scenario.start if scenario.start is not None else random_free_pose(grid, rng)
+    if scenario.furniture:
+        keep_free = [start, *(place for phase in scenario.phases for place in phase.places)]
+        grid = furnished(grid, scenario.furniture, rng, keep_free)
+    floor = Floor(grid)
+    for place in (start, *(place for phase in scenario.phases for place in phase.places)):
+        check_room(floor, place, scenario.kobuki.radius_m)
+    return Stage(floor, scenario.kobuki, scenario.lidar, scenario.shutter, start, for_stage)
+
+
+def check_room(floor: Floor, place: SE2, radius_m: float) -> None:
+    """Refuse a place in the map frame that has less room (m) around it than the robot needs.
+
+    Raises
+    ------
+    InputError
+        If it has.
+    """
+    room = floor.room_at(place.x, place.y)
+    if room < radius_m:
+        raise InputError(
+            expected=f"a place with {radius_m:g} m around it for the robot",
+            received=f"({place.x:.2f}, {place.y:.2f}) m, where there is {room:.2f} m",
+            remedy="choose a place in the free space of the map",
+        )

@@ -1,0 +1,115 @@
+"""Drawn buildings: a robot's world without a file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from firstfix.core.errors import InputError, MapError
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.se2 import SE2
+from firstfix.fields.clearance import chessboard_clearance
+from firstfix.lab.worlds.corridor import corridor
+from firstfix.lab.worlds.drawing import MARGIN, RESOLUTION, Drawing
+from firstfix.lab.worlds.house import house
+from firstfix.lab.worlds.office import office
+from firstfix.lab.worlds.warehouse import warehouse
+
+ROOM_PITCH = 8.0
+
+
+def identical_rooms(count: int) -> OccupancyGrid:
+    """Draw rooms that no scan from inside can tell apart: one plan, doors closed.
+
+    Parameters
+    ----------
+    count : int
+        Number of rooms, at least 1; they stand in a row, `ROOM_PITCH` metres apart.
+
+    Returns
+    -------
+    OccupancyGrid
+        The map; room i begins at x = i · `ROOM_PITCH`.
+
+    Raises
+    ------
+    InputError
+        If there is no room to draw.
+    """
+    if count < 1:
+        raise InputError(
+            expected="at least 1 room", received=f"{count}", remedy="ask for one room or more"
+        )
+    plan = Drawing(count * ROOM_PITCH, 5.0, RESOLUTION, MARGIN)
+    for i in range(count):
+        x = i * ROOM_PITCH
+        plan.room(x, 0.0, x + 6.4, 4.6)
+        # Without these a turn of the room by 180° would look the same.
+        plan.solid(x + 0.1, 3.2, x + 1.3, 4.5)
+        plan.solid(x + 5.0, 0.1, x + 6.3, 0.6)
+        plan.table(x + 2.6, 1.8, x + 4.2, 2.6)
+    return plan.grid()
+
+
+def random_free_pose(
+    grid: OccupancyGrid, rng: np.random.Generator, clearance_m: float = 0.3
+) -> SE2:
+    """Draw one pose where a robot can stand, as `random_free_poses` does."""
+    return random_free_poses(grid, rng, 1, clearance_m)[0]
+
+
+def random_free_poses(
+    grid: OccupancyGrid, rng: np.random.Generator, count: int, clearance_m: float = 0.3
+) -> list[SE2]:
+    """Draw poses where a robot can stand, evenly over the map's free cells and all headings.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+    rng : numpy.random.Generator
+        Source of chance.
+    count : int
+        Number of poses.
+    clearance_m : float
+        Half the side of the square around a pose that must be free, m, up to 254 cells.
+
+    Returns
+    -------
+    list of SE2
+        ``T_map_base`` of each.
+
+    Raises
+    ------
+    MapError
+        If no place of the map is that free.
+    """
+    # Beyond the border of the map nothing is known to be free.
+    blocked = np.pad(~grid.seen_free, 1, constant_values=True)
+    clearance_cells = chessboard_clearance(blocked)[1:-1, 1:-1]
+    places = np.flatnonzero(clearance_cells > clearance_m / grid.resolution)
+    if len(places) == 0:
+        raise MapError(
+            expected=f"a free place with {clearance_m} m around it",
+            received=f"a map of {grid.free_area:.1f} m² free area without one",
+            remedy="use another map or less clearance",
+        )
+    return [_pose_in_cell(grid, rng, int(rng.choice(places))) for _ in range(count)]
+
+
+def _pose_in_cell(grid: OccupancyGrid, rng: np.random.Generator, index: int) -> SE2:
+    row, column = divmod(index, grid.width)
+    x, y = grid.to_map(np.array([column, row]) + rng.uniform(0.0, 1.0, 2))
+    return SE2(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
+
+
+WORLDS: dict[str, Callable[[], OccupancyGrid]] = {
+    "office": office,
+    "rooms": partial(identical_rooms, 4),
+    "warehouse": warehouse,
+    "house": house,
+    "corridor": corridor,
+}

@@ -1,0 +1,207 @@
+"""Several places fit: which one wins while the robot moves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from firstfix.core.estimate import Hypothesis, LocateResult, Verdict
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.global_localization.verdict import log_likelihoods
+from firstfix.localizer.config import WatchConfig
+from firstfix.localizer.relocation import moved_on, same_place
+
+# Two scans half a metre apart are half as good as two of different robots.
+_NEWS = 0.5
+# A place of the whole map that is less likely, against the best there, is no rival.
+_RIVAL_SHARE = 0.1
+_MOST_ENTRIES = 64
+_LEAST_UNLISTED = 1e-3
+
+
+class Standing(Enum):
+    """How the contest stands."""
+
+    OPEN = "open"
+    WON = "won"
+    LOST = "lost"
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A place in the contest: it moves with the odometry."""
+
+    T_map_odom: SE2
+    log_weight: float
+    place: Hypothesis
+
+    def carried(self, T_odom_base: SE2) -> Entry:
+        """Return the same place where the odometry has carried it."""
+        return replace(self, place=replace(self.place, pose=self.T_map_odom @ T_odom_base))
+
+
+class Contest:
+    """Follows all places that fit, without chance, and weighs them where a scan brings news.
+
+    A particle filter cannot do this: in places that look the same its mass wanders by chance, until
+    one of them has it all (docs/decisions/0011).
+
+    Parameters
+    ----------
+    places : tuple of Hypothesis
+        What the scan left open; at least one.
+    T_odom_base : SE2
+        Odometry at that scan.
+    matcher : ScanMatcher
+        The static stage.
+    config : WatchConfig
+        Settings.
+    """
+
+    def __init__(
+        self,
+        places: tuple[Hypothesis, ...],
+        T_odom_base: SE2,
+        matcher: ScanMatcher,
+        config: WatchConfig,
+    ) -> None:
+        self._matcher = matcher
+        self._config = config
+        self._looked_at = T_odom_base
+        self._looks = 0
+        self._misses = 0
+        # That the robot is where nobody has listed it, in another building perhaps.
+        unlisted = 1.0 - sum(place.probability for place in places)
+        self._log_unlisted = math.log(max(unlisted, _LEAST_UNLISTED))
+        self._entries = _entries(places, T_odom_base)
+
+    @property
+    def places(self) -> tuple[Hypothesis, ...]:
+        """The places at the last look, with their probabilities in the contest, best first."""
+        logs = np.array([*(entry.log_weight for entry in self._entries), self._log_unlisted])
+        weights = np.exp(logs - logs.max())
+        shares = (weights / weights.sum())[:-1].tolist()
+        ranked = sorted(zip(shares, self._entries, strict=True), key=lambda pair: -pair[0])
+        return tuple(replace(entry.place, probability=share) for share, entry in ranked)
+
+    def brings_news(self, T_odom_base: SE2) -> bool:
+        """Tell whether the robot has moved enough for a scan to say something new."""
+        return moved_on(self._looked_at, T_odom_base, self._config)
+
+    def look(self, scan: LaserScan, T_odom_base: SE2) -> Standing:
+        """Weigh the places by a scan, and ask whether the whole map has a better one.
+
+        Parameters
+        ----------
+        scan : LaserScan
+            The scan.
+        T_odom_base : SE2
+            Odometry at the scan.
+
+        Returns
+        -------
+        Standing
+            WON if the scan is UNIQUE at one of the places, or if one has nearly all of the
+            probability after some looks, and fits; LOST if none of the places fits several times in
+            a row, as after a kidnap, or if they have become too many; else OPEN.
+        """
+        self._looked_at = T_odom_base
+        self._looks += 1
+        self._weigh(scan, T_odom_base)
+        fits = any(e.place.score <= self._config.doubtful_cost for e in self._entries)
+        self._misses = 0 if fits else self._misses + 1
+        if self._misses >= self._config.won_looks:
+            return Standing.LOST
+        result = self._matcher.locate(scan)
+        if result.verdict is Verdict.UNIQUE and self._wins_outright(result.hypotheses[0]):
+            return Standing.WON
+        self._admit(result, T_odom_base)
+        if len(self._entries) >= _MOST_ENTRIES:
+            return Standing.LOST  # the right place may be one that there was no room for
+        best = self.places[0]
+        decided = best.probability >= self._config.won_probability
+        decided = decided and best.score <= self._config.won_cost
+        enough = self._looks >= self._config.won_looks
+        return Standing.WON if decided and enough else Standing.OPEN
+
+    def look_at_rest(self, scan: LaserScan, T_odom_base: SE2) -> Standing:
+        """Ask whether the scan at the same place has become a better one: people and hands go.
+
+        It is no second witness, so nothing is weighed; but a UNIQUE scan decides, and as long as no
+        motion has decided anything, the places are those of the last scan. Arguments as in `look`.
+
+        Returns
+        -------
+        Standing
+            WON or OPEN.
+        """
+        self._entries = [entry.carried(T_odom_base) for entry in self._entries]
+        result = self._matcher.locate(scan)
+        best = result.best
+        if best is None or result.verdict is Verdict.NO_MATCH:
+            return Standing.OPEN
+        if self._looks == 0:
+            self._entries = _entries(result.hypotheses, T_odom_base)
+        if result.verdict is Verdict.UNIQUE and self._wins_outright(best):
+            return Standing.WON
+        return Standing.OPEN
+
+    def _weigh(self, scan: LaserScan, T_odom_base: SE2) -> None:
+        """Multiply the weights of all places by what the scan says there, even of hopeless ones.
+
+        Who is dropped could not be told from a place that nobody has thought of yet.
+        """
+        poses = [entry.T_map_odom @ T_odom_base for entry in self._entries]
+        examined = self._matcher.examine(scan, poses)
+        scores = np.array([*(place.score for place in examined), self._config.won_cost])
+        *logs, unlisted = _NEWS * log_likelihoods(scores, examined[0].evidence.beams)
+        self._log_unlisted += float(unlisted)
+        weighed = [
+            Entry(place.pose @ T_odom_base.inverse(), entry.log_weight + float(log), place)
+            for entry, place, log in zip(self._entries, examined, logs, strict=True)
+        ]
+        weighed.sort(key=lambda entry: -entry.log_weight)
+        self._entries = []
+        for entry in weighed:
+            if self._known(entry.place) is None:
+                self._entries.append(entry)
+
+    def _wins_outright(self, place: Hypothesis) -> bool:
+        known = self._known(place)
+        if known is None or place.score > self._config.won_cost:
+            return False
+        self._entries = [replace(known, place=place)]
+        return True
+
+    def _admit(self, result: LocateResult, T_odom_base: SE2) -> None:
+        """Let in the places that the scan finds and that were not listed, as likely as it says."""
+        best = result.best
+        if best is None or result.verdict is Verdict.NO_MATCH:
+            return
+        most = max(entry.log_weight for entry in self._entries)
+        for place in result.hypotheses:
+            share = place.probability / best.probability
+            full = len(self._entries) >= _MOST_ENTRIES
+            if share >= _RIVAL_SHARE and not full and self._known(place) is None:
+                self._entries.append(
+                    Entry(place.pose @ T_odom_base.inverse(), most + math.log(share), place)
+                )
+
+    def _known(self, place: Hypothesis) -> Entry | None:
+        """Return the entry that is this place, if any."""
+        for entry in self._entries:
+            if same_place(entry.place.pose, place.pose, self._config):
+                return entry
+        return None
+
+
+def _entries(places: tuple[Hypothesis, ...], T_odom_base: SE2) -> list[Entry]:
+    return [
+        Entry(place.pose @ T_odom_base.inverse(), math.log(max(place.probability, 1e-9)), place)
+        for place in places
+    ]

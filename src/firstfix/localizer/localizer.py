@@ -1,0 +1,396 @@
+"""The system: one input in, some outputs out."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.amcl.filter import start
+from firstfix.amcl.initial import around_pose
+from firstfix.amcl.particles import Particles
+from firstfix.amcl.sensor import build_sensor
+from firstfix.amcl.tracker import Track, Tracker
+from firstfix.core.estimate import Evidence, Hypothesis, Verdict
+from firstfix.core.odometry import Odometry, Signal, SignalKind
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
+from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.localizer.config import LocalizerConfig
+from firstfix.localizer.contest import Contest, Standing
+from firstfix.localizer.deciding_motion import deciding_motion
+from firstfix.localizer.inputs import Input, NewMap, NoMotionUpdate, PoseHint, Reset
+from firstfix.localizer.odometry_buffer import OdometryBuffer
+from firstfix.localizer.outputs import Hypotheses, InitialPose, Output, Status, TrackedPose
+from firstfix.localizer.pose_monitor import Finding, Watch
+from firstfix.localizer.relocation import Candidates, moved_on, same_place
+from firstfix.localizer.states import Event, State, after
+
+# The covariance of the static stage is that of one scan in a perfect map; a track begins wider.
+_BEGIN_COVARIANCE = np.diag([0.03**2, 0.03**2, np.radians(1.0) ** 2])
+
+# A robot that stands where nothing fits sees the same again: people may go, so once a second.
+_PATIENCE_S = 1.0
+_MOVED_M = 0.1
+
+# Where somebody says the robot is, it must fit nearly as well as at the best place of the map.
+_AS_GOOD = 1.5
+_GOOD_COST = 0.3
+
+# Odometry may lag by so many scans: a second at 40 Hz. A scan that waits alone would starve under
+# odometry that lags by more than the time from scan to scan.
+_MOST_WAITING = 40
+
+# How far a robot may be from where its track was lost and still be believed at the first word.
+_STRAYED_M = 2.0
+
+
+class Localizer:
+    """Finds a robot, follows it, notices when it was carried away, and finds it again.
+
+    No clock, no thread, no socket: time is in the inputs. The same inputs give the same outputs.
+
+    Parameters
+    ----------
+    config : LocalizerConfig, optional
+        Settings.
+    cache_dir : Path, optional
+        Folder of prepared maps; by default every map is prepared anew.
+    """
+
+    def __init__(
+        self, config: LocalizerConfig | None = None, cache_dir: Path | None = None
+    ) -> None:
+        self.config = config or LocalizerConfig()
+        self.state = State.NO_MAP
+        self._cache_dir = cache_dir
+        self._rng = np.random.default_rng(self.config.amcl.seed)
+        self._odometry = OdometryBuffer()
+        self._has_leapt = False  # and no scan has fitted since
+        self._waiting: deque[LaserScan] = deque(maxlen=_MOST_WAITING)
+        self._lifted: set[SignalKind] = set()
+        self._stands_since = -math.inf
+        self._found_nothing_at: tuple[float, SE2] | None = None
+        self._update_asked = False
+        self._looked_at = 0.0
+        self._hint: PoseHint | None = None
+        self._lost_track: SE2 | None = None  # T_map_odom, if contradicted and not picked up since
+        self._last_word_at: SE2 | None = None
+        self._candidates = Candidates(self.config.watch)
+        self._track: Track | None = None
+        self._matcher: ScanMatcher
+        self._tracker: Tracker
+        self._watch: Watch
+        self._contest: Contest
+
+    @property
+    def particles(self) -> Particles | None:
+        """The belief; None while there is none."""
+        return self._track.state.particles if self._track is not None else None
+
+    @property
+    def matcher(self) -> ScanMatcher | None:
+        """The static stage on the map in use; None before the first map."""
+        return None if self.state is State.NO_MAP else self._matcher
+
+    def handle(self, given: Input) -> list[Output]:
+        """Take in what happened.
+
+        Parameters
+        ----------
+        given : Input
+            A map, scan, odometry message, signal of the base, hint or request. Scans and odometry
+            may come in any order as long as each kind is in the order of its stamps: a scan waits
+            until odometry reaches its stamp; if it reaches several at once, the newest is used.
+
+        Returns
+        -------
+        list of Output
+            What there is to say about it, in order; often nothing.
+
+        Raises
+        ------
+        MapError
+            If a new map cannot be searched. The state is that of before.
+        """
+        if isinstance(given, NewMap):
+            return self._take_map(given)
+        if isinstance(given, Odometry):
+            return self._take_odometry(given)
+        if isinstance(given, Signal):
+            return self._take_signal(given)
+        if self.state is State.NO_MAP:
+            return [Status(given.stamp, self.state, "no map yet")]
+        if isinstance(given, LaserScan):
+            self._waiting.append(given)
+            return self._take_waiting_scan()
+        if isinstance(given, PoseHint):
+            return self._take_hint(given)
+        if isinstance(given, Reset):
+            self._lifted.clear()  # of a base that was restarted in the air, nobody hears it land
+            return [self._forget(given.stamp, Event.RESET, "told to search anew")]
+        return self._take_update_request(given)
+
+    # ---- inputs
+
+    def _take_map(self, given: NewMap) -> list[Output]:
+        matcher = ScanMatcher(given.grid, config=self.config.locate, cache_dir=self._cache_dir)
+        sensor = build_sensor(given.grid, self.config.amcl)
+        self._matcher = matcher
+        self._tracker = Tracker(sensor, self.config.amcl, self._no_injection)
+        return [self._forget(given.stamp, Event.MAP_CAME, "a map came: searching")]
+
+    def _take_odometry(self, given: Odometry) -> list[Output]:
+        before = self._odometry.last
+        has_leapt = self._odometry.leaps(given)
+        has_jumped = self._odometry.add(given)
+        self._has_leapt |= has_leapt or has_jumped
+        if not has_jumped:
+            return self._take_waiting_scan()
+        self._waiting.clear()  # of the clock or the frame before
+        self._stands_since = min(self._stands_since, given.stamp)
+        return self._follow_jump(before, given)
+
+    def _take_signal(self, given: Signal) -> list[Output]:
+        if not given.kind.means_lifted:
+            return []
+        if not given.active:
+            self._lifted.discard(given.kind)
+            self._stands_since = given.stamp
+            self._waiting.clear()  # taken in somebody's hands
+            return []
+        self._lifted.add(given.kind)
+        if self.state is State.NO_MAP:
+            return []
+        reason = f"{given.kind.value}: waiting until the robot stands again, then searching"
+        return [self._forget(given.stamp, Event.KIDNAPPED, reason)]
+
+    def _take_hint(self, given: PoseHint) -> list[Output]:
+        self._track = None
+        self._hint = given
+        self.state = after(self.state, Event.PERSON_SAID)
+        reason = f"{given.source} says where; the next scan will tell"
+        return [Status(given.stamp, self.state, reason)]
+
+    def _take_update_request(self, given: NoMotionUpdate) -> list[Output]:
+        self._update_asked = True
+        self._found_nothing_at = None
+        return [Status(given.stamp, self.state, "the next scan will be used in any case")]
+
+    def _take_waiting_scan(self) -> list[Output]:
+        last = self._odometry.last
+        if last is None or self.state is State.NO_MAP:
+            return []
+        reached = [scan for scan in self._waiting if scan.stamp <= last.stamp]
+        if not reached:
+            return []
+        for scan in reached:  # not only the first: one stamp from the future must not block all
+            self._waiting.remove(scan)
+        scan = reached[-1]
+        T_odom_base = self._odometry.at(scan.stamp)
+        if T_odom_base is None:
+            reason = "a scan is older than the odometry that is known: left out"
+            return [Status(scan.stamp, self.state, reason)]
+        if self._lifted or scan.stamp < self._stands_since:
+            return []
+        if self.state is State.SEARCHING:
+            return self._search(scan, T_odom_base)
+        if self.state is State.TRACKING:
+            return self._decide(scan, T_odom_base)
+        return self._follow(scan, T_odom_base)
+
+    # ---- states
+
+    def _search(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
+        if not self._worth_searching(scan, T_odom_base):
+            return []
+        result = self._matcher.locate(scan)
+        best = result.best
+        self._found_nothing_at = None
+        if best is None or result.verdict is Verdict.NO_MATCH:
+            self._found_nothing_at = scan.stamp, T_odom_base
+            evidence = best.evidence if best is not None else None
+            return [Status(scan.stamp, self.state, result.reason, evidence)]
+        if result.verdict is Verdict.UNIQUE:
+            if not self._believable(T_odom_base, best):
+                reason = "one place fits, far from where the track was lost: waiting for more"
+                return [Status(scan.stamp, self.state, reason, best.evidence)]
+            return self._arrive(scan, T_odom_base, best, Event.ONE_PLACE, result.reason)
+        self._contest = Contest(result.hypotheses, T_odom_base, self._matcher, self.config.watch)
+        self._looked_at = scan.stamp
+        self.state = after(self.state, Event.SEVERAL_PLACES)
+        return self._tell_places(scan, result.reason)
+
+    def _decide(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
+        if self._hint is not None:
+            return self._check_hint(scan, T_odom_base, self._hint)
+        if self._contest.brings_news(T_odom_base) or self._update_asked:
+            standing = self._contest.look(scan, T_odom_base)
+        elif not 0.0 <= scan.stamp - self._looked_at < self.config.watch.look_again_s:
+            standing = self._contest.look_at_rest(scan, T_odom_base)
+        else:
+            return []
+        self._update_asked, self._looked_at = False, scan.stamp
+        best = self._contest.places[0]
+        if standing is Standing.WON:
+            reason = f"one place has won; {best.evidence.explained:.0%} of the beams fit there"
+            return self._arrive(scan, T_odom_base, best, Event.PLACE_WON, reason)
+        if standing is Standing.LOST:
+            reason = "the scans fit none of the places that were left: searching anew"
+            return [self._forget(scan.stamp, Event.LOST, reason)]
+        left = len(self._contest.places)
+        reason = f"{left} places left, the best at {best.probability:.0%}; motion would decide"
+        return self._tell_places(scan, reason)
+
+    def _check_hint(self, scan: LaserScan, T_odom_base: SE2, hint: PoseHint) -> list[Output]:
+        if np.count_nonzero(usable_beams(scan).hit) < FEWEST_HITS:
+            reason = f"{hint.source} says where; the sensor sees too little to tell"
+            return [Status(scan.stamp, self.state, reason)]
+        self._hint = None
+        place = self._matcher.search_locally(scan, hint.T_map_base)
+        result = self._matcher.locate(scan)
+        best = result.best or place
+        known = same_place(place.pose, best.pose, self.config.watch)
+        elsewhere = result.verdict is Verdict.UNIQUE and not known
+        as_good = place.score <= _AS_GOOD * max(best.score, _GOOD_COST)
+        if as_good and not elsewhere and place.score <= self.config.watch.doubtful_cost:
+            fit = f"{place.evidence.explained:.0%} of the beams fit there"
+            reason = f"{hint.source} said where; {fit}"
+            return self._arrive(scan, T_odom_base, place, Event.PLACE_WON, reason)
+        reason = f"{hint.source} said where, but the scan fits elsewhere, or nowhere: searching"
+        return [self._forget(scan.stamp, Event.LOST, reason, place.evidence)]
+
+    def _follow(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
+        track = self._move(scan, T_odom_base)
+        T_map_base = track.T_map_odom @ T_odom_base
+        look = self._watch.look(scan, T_odom_base, T_map_base)
+        if look.finding is Finding.ELSEWHERE:
+            if same_place(look.place.pose, T_map_base, self.config.watch):
+                return self._correct(scan, T_odom_base, look.place)
+            reason = f"found {look.place.pose.distance_to(T_map_base):.1f} m from the track"
+            return self._arrive(scan, T_odom_base, look.place, Event.FOUND_ELSEWHERE, reason)
+        evidence = look.place.evidence
+        if look.finding is Finding.CONTRADICTED:
+            reason = f"only {evidence.explained:.0%} of the beams fit here, for too long: searching"
+            return [self._forget(scan.stamp, Event.LOST, reason, evidence)]
+        said = f"{evidence.explained:.0%} of the beams fit"
+        self._has_leapt &= look.finding is not Finding.FITS
+        if self._has_leapt:
+            reason = f"odometry has leapt, and only {said} since: waiting for more"
+            return [Status(scan.stamp, self.state, reason, evidence)]
+        reason = {
+            Finding.FITS: said,
+            Finding.SILENT: "the sensor sees too little to tell: going on by odometry",
+        }.get(look.finding, f"doubtful: only {said}")
+        covariance = track.state.estimate.covariance
+        return [
+            TrackedPose(scan.stamp, T_map_base, covariance, track.T_map_odom),
+            Status(scan.stamp, self.state, reason, evidence),
+        ]
+
+    # ---- steps
+
+    def _arrive(
+        self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis, event: Event, reason: str
+    ) -> list[Output]:
+        """Tell that the robot is found, and follow from there."""
+        tracked = self._settle(scan, T_odom_base, place)
+        self.state = after(self.state, event)
+        return [
+            InitialPose(scan.stamp, place.pose, tracked.covariance),
+            tracked,
+            Status(scan.stamp, self.state, reason, place.evidence),
+        ]
+
+    def _correct(self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis) -> list[Output]:
+        """Put a track right that is a little off; the robot was neither lost nor found."""
+        tracked = self._settle(scan, T_odom_base, place)
+        return [tracked, Status(scan.stamp, self.state, "put right", place.evidence)]
+
+    def _settle(self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis) -> TrackedPose:
+        """Begin a track at a place."""
+        covariance = place.covariance + _BEGIN_COVARIANCE
+        n = self.config.amcl.max_particles
+        self._has_leapt = False
+        self._track = Track(start(around_pose(place.pose, covariance, n, self._rng)), T_odom_base)
+        self._watch = Watch(self._matcher, self.config.watch)
+        T_map_odom = place.pose @ T_odom_base.inverse()
+        return TrackedPose(scan.stamp, place.pose, covariance, T_map_odom)
+
+    def _believable(self, T_odom_base: SE2, place: Hypothesis) -> bool:
+        """Tell whether a UNIQUE place may be published.
+
+        A robot that lost its track and was not picked up is not far, or it has left the mapped
+        area: for a place far away, several scans from different places must speak.
+        """
+        if self._lost_track is None:
+            return True
+        if place.pose.distance_to(self._lost_track @ T_odom_base) <= _STRAYED_M:
+            return True
+        before = self._last_word_at
+        if before is not None and not moved_on(before, T_odom_base, self.config.watch):
+            return False
+        self._last_word_at = T_odom_base
+        return self._candidates.count(place.pose, T_odom_base) >= self.config.watch.won_looks
+
+    def _worth_searching(self, scan: LaserScan, T_odom_base: SE2) -> bool:
+        """Tell whether a scan may say what the last, which fitted nowhere, did not."""
+        if self._found_nothing_at is None:
+            return True
+        stamp, T_odom_then = self._found_nothing_at
+        moved = T_odom_then.distance_to(T_odom_base) >= _MOVED_M
+        return moved or not 0.0 <= scan.stamp - stamp < _PATIENCE_S
+
+    def _move(self, scan: LaserScan, T_odom_base: SE2) -> Track:
+        assert self._track is not None  # noqa: S101 - the states that follow have one
+        step = self._tracker.update if self._update_asked else self._tracker.follow
+        self._update_asked = False
+        self._track = step(self._track, T_odom_base, scan, self._rng)
+        return self._track
+
+    def _forget(
+        self, stamp: float, event: Event, reason: str, evidence: Evidence | None = None
+    ) -> Status:
+        contradicted = event is Event.LOST and self._track is not None
+        self._lost_track = self._track.T_map_odom if contradicted and self._track else None
+        self._last_word_at = None
+        self._found_nothing_at = None
+        self._candidates.clear()
+        self._track = None
+        self._hint = None
+        self._waiting.clear()
+        self.state = after(self.state, event)
+        return Status(stamp, self.state, reason, evidence)
+
+    def _tell_places(self, scan: LaserScan, reason: str) -> list[Output]:
+        places = self._contest.places
+        motion = deciding_motion(scan, places, self._matcher.fields.grid)
+        outputs: list[Output] = [
+            Hypotheses(scan.stamp, places),
+            Status(scan.stamp, self.state, reason, places[0].evidence),
+        ]
+        return [*outputs, motion] if motion is not None else outputs
+
+    def _follow_jump(self, before: Odometry | None, now: Odometry) -> list[Output]:
+        """Go on at the same pose in a new odometry frame; the next scan will tell whether."""
+        if self.state is State.TRACKING and self._hint is None:
+            # The places moved with the old frame.
+            reason = "odometry jumped before one of several places had won: searching anew"
+            return [self._forget(now.stamp, Event.LOST, reason)]
+        if self._track is None or before is None:
+            return []
+        T_map_base = self._track.T_map_odom @ before.T_odom_base
+        T_before_now = self._track.state.estimate.pose.inverse() @ T_map_base
+        # Odometry that would have brought the track here, had its frame always been the new one.
+        self._track = Track(self._track.state, now.T_odom_base @ T_before_now.inverse())
+        self._watch = Watch(self._matcher, self.config.watch)
+        return []
+
+    @staticmethod
+    def _no_injection(_: LaserScan, __: int, ___: np.random.Generator) -> NDArray[np.float64]:
+        """Nothing: what augmented recovery guesses at random, the watch finds by search."""
+        return np.empty((0, 3))

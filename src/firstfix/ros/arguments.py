@@ -1,0 +1,142 @@
+"""Arguments as ROS 2 writes them: rules for names, parameters, files of parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from firstfix.core.errors import InputError
+from firstfix.core.se2 import SE2
+from firstfix.io.parameters.amcl_yaml import load_amcl_config
+from firstfix.io.parameters.ros_parameters import read_parameters
+from firstfix.io.safe_yaml import kind, parse_yaml, to_flag, to_number
+from firstfix.ros.names import Names
+from firstfix.ros.node_config import NodeConfig
+from firstfix.ros.parameters import configured, parameters
+
+_NODE, _NAMESPACE = ("__node", "__name"), "__ns"
+_STRING = "tag:yaml.org,2002:str"
+
+
+def names_from(rules: Iterable[str], node: str, namespace: str) -> Names:
+    """Read rules for names.
+
+    Parameters
+    ----------
+    rules : iterable of str
+        ``scan:=base_scan``, ``__ns:=/robot1``, ``__node:=finder``, and ``node:scan:=base_scan``,
+        which holds for the node of that name only.
+    node, namespace : str
+        Where no rule says otherwise; the leading slash of the namespace may be missing.
+
+    Returns
+    -------
+    Names
+        The place of the node.
+
+    Raises
+    ------
+    InputError
+        If a rule or a name is none.
+    """
+    pairs = [_split(rule, "scan:=base_scan") for rule in rules]
+    for old, new in pairs:
+        node = new if old in _NODE else node
+        namespace = new if old == _NAMESPACE else namespace
+    special = (*_NODE, _NAMESPACE)
+    given = [(*old.rpartition(":"), new) for old, new in pairs if old not in special]
+    kept = tuple((old, new) for owner, _, old, new in given if owner in ("", node))
+    return Names(node, "/" + namespace.strip("/"), kept)
+
+
+def settings_from(
+    *,
+    node: str,
+    amcl_file: Path | None,
+    files: Iterable[Path],
+    assignments: Iterable[str],
+    options: Mapping[str, Any],
+) -> NodeConfig:
+    """Read the settings of a node; what comes later in the list of parameters counts more.
+
+    Parameters
+    ----------
+    node : str
+        Name of the node, for its sections of files.
+    amcl_file : Path or None
+        Parameters of Nav2's AMCL, in a section ``amcl``.
+    files : iterable of Path
+        Parameters of the node, in a section of its own or in one for all nodes.
+    assignments : iterable of str
+        ``mode:=full``.
+    options : mapping of str to object
+        Parameters by name; None where one was not given.
+
+    Returns
+    -------
+    NodeConfig
+        The settings.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be used, a name is unknown, or a value does not fit.
+    """
+    values: dict[str, Any] = {}
+    if amcl_file is not None:
+        values |= _amcl_values(amcl_file)
+    known = frozenset(parameter.name for parameter in parameters())
+    for file in files:
+        found = read_parameters(file, node, known)
+        values |= {name: _scalar(name, value) for name, value in found.items()}
+    for assignment in assignments:
+        name, text = _split(assignment, "mode:=full")
+        line = parse_yaml(f"value: {text}".encode(), Path(name), example=assignment)
+        values[name] = _scalar(name, line.value[0][1])
+    return configured(values | {k: v for k, v in options.items() if v is not None})
+
+
+def _split(rule: str, example: str) -> tuple[str, str]:
+    left, sign, right = rule.partition(":=")
+    if not sign or not left or not right:
+        raise InputError(
+            expected="an argument like " + example,
+            received=f"{rule!r:.60}",
+            remedy="write name:=value",
+        )
+    return left, right
+
+
+def _amcl_values(path: Path) -> dict[str, Any]:
+    config = load_amcl_config(path)
+    values: dict[str, Any] = {}
+    for entry in fields(config):
+        value = getattr(config, entry.name)
+        if isinstance(value, SE2):
+            values |= {f"{entry.name}.{part}": getattr(value, part) for part in ("x", "y", "yaw")}
+        else:
+            values[entry.name] = value.value if isinstance(value, Enum) else value
+    return values
+
+
+def _scalar(name: str, node: yaml.Node) -> bool | int | float | str:
+    """Read a value by ROS's rules: quotes make a text, and so does what is nothing else."""
+    if not isinstance(node, yaml.ScalarNode):
+        raise InputError(
+            expected=f"one value for {name}", received=kind(node), remedy="write a number or a word"
+        )
+    text = str(node.value)
+    if node.style is not None:
+        return text
+    flag, number = to_flag(text), to_number(text)
+    if flag is not None:
+        return flag
+    if math.isnan(number):
+        return text
+    return int(text) if text.lstrip("+-").isdigit() else number

@@ -1,0 +1,56 @@
+"""What a node must publish about itself for `ros2 node list` and `ros2 node info` to show it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from cyclonedds.core import Entity
+
+from firstfix.ros.channels import Delivery, Topic
+from firstfix.ros.dds.types import is_before_iron, make
+
+GRAPH = Topic("ros_discovery_info", "rmw_dds_common/ParticipantEntitiesInfo", Delivery.LATCHED)
+
+# By this ROS 2 knows a participant as one of its own.
+USER_DATA = b"enclave=/;"
+
+
+def entities(
+    participant: Entity,
+    namespace: str,
+    name: str,
+    readers: Iterable[Entity],
+    writers: Iterable[Entity],
+) -> Any:
+    """Build a message that says what belongs to a node.
+
+    Parameters
+    ----------
+    participant : Entity
+        That of the node.
+    namespace, name : str
+        Of the node; the namespace with its leading slash.
+    readers, writers : iterable of Entity
+        Of its topics.
+
+    Returns
+    -------
+    message
+        For `GRAPH`.
+    """
+    node = make(
+        "rmw_dds_common/NodeEntitiesInfo",
+        node_namespace=namespace,
+        node_name=name,
+        reader_gid_seq=[_gid(reader) for reader in readers],
+        writer_gid_seq=[_gid(writer) for writer in writers],
+    )
+    return make(GRAPH.type_name, gid=_gid(participant), node_entities_info_seq=[node])
+
+
+def _gid(entity: Entity) -> Any:
+    size = 24 if is_before_iron() else 16
+    padded = entity.guid.bytes.ljust(size, b"\0")
+    return make("rmw_dds_common/Gid", data=np.frombuffer(padded, np.uint8))

@@ -1,0 +1,149 @@
+"""Topics and services of a lifecycle node of ROS 2, as the transport of `Node`."""
+
+from __future__ import annotations
+
+import math
+import time
+from functools import partial
+from typing import Any
+
+import rclpy
+from rclpy.lifecycle import LifecycleNode
+
+from firstfix.ros.channels import (
+    PARTICLE_POSES,
+    PARTICLES,
+    Heard,
+    Topic,
+    heard_topics,
+    said_topics,
+)
+from firstfix.ros.node import Node
+from firstfix.ros.node_config import NodeConfig
+from firstfix.ros.ros2.types import LATCHED, find, make, quality
+from firstfix.ros.transport import Severity
+
+_SERVICES = {
+    "reinitialize_global_localization": ("std_srvs/Empty", Heard.RESET),
+    "request_nomotion_update": ("std_srvs/Empty", Heard.UPDATE),
+    "set_initial_pose": ("nav2_msgs/SetInitialPose", Heard.INITIAL_POSE),
+}
+
+
+class Ros2:
+    """A transport for `Node`: what a lifecycle node has from being configured to cleaned up.
+
+    Parameters
+    ----------
+    owner : LifecycleNode
+        Whose topics and services these are.
+    config : NodeConfig
+        What is published depends on the mode.
+    """
+
+    def __init__(self, owner: LifecycleNode, config: NodeConfig) -> None:
+        self._owner = owner
+        self._config = config
+        self._node: Node | None = None
+        self._is_active = False
+        self.particles = PARTICLES if find("msg", PARTICLES.type_name) else PARTICLE_POSES
+        kinds = {t: find("msg", t.type_name) for t in said_topics(config, self.particles)}
+        self._publishers = {
+            topic.name: owner.create_lifecycle_publisher(kind, topic.name, quality(topic))
+            for topic, kind in kinds.items()
+        }
+        self._subscriptions: list[Any] = []
+        self._services: list[Any] = []
+
+    def start(self, node: Node) -> None:
+        """Let a node think, subscribe to what it hears and offer what it can be asked.
+
+        Raises
+        ------
+        InputError
+            If its map cannot be used, or a package of messages is missing.
+        """
+        node.start()
+        self._node = node
+        self.deactivate()
+        for heard, topic in heard_topics(self._config).items():
+            if (kind := self._find("msg", topic.type_name, topic.name)) is not None:
+                hear = partial(self._hear, node, heard, topic)
+                made = self._owner.create_subscription(kind, topic.name, hear, quality(topic))
+                self._subscriptions.append(made)
+        for name, (type_name, heard) in _SERVICES.items():
+            if (kind := self._find("srv", type_name, name)) is not None:
+                answer = partial(self._answer, node, heard, name)
+                self._services.append(self._owner.create_service(kind, name, answer))
+
+    def activate(self) -> None:
+        """Pass on what is heard."""
+        self._is_active = True
+        if self._node is not None:
+            self._node.misses_since = time.monotonic()
+
+    def deactivate(self) -> None:
+        """Pass on only what is latched."""
+        self._is_active = False
+        if self._node is not None:
+            self._node.misses_since = math.inf
+
+    def close(self) -> None:
+        """Let the node end, and give back all that was made."""
+        self._is_active = False
+        if self._node is not None:
+            self._node.stop()
+        publishers, self._publishers = self._publishers, {}
+        for publisher in publishers.values():
+            self._owner.destroy_lifecycle_publisher(publisher)
+        for subscription in self._subscriptions:
+            self._owner.destroy_subscription(subscription)
+        for service in self._services:
+            self._owner.destroy_service(service)
+
+    def make(self, type_name: str, /, **fields: Any) -> Any:
+        """Build a message."""
+        return make(type_name, **fields)
+
+    def publish(self, topic: Topic, message: Any) -> None:
+        """Send a message; while the node is not active, rclpy drops it."""
+        if (publisher := self._publishers.get(topic.name)) is None:
+            return  # the node did not wait any longer for this thought
+        try:
+            publisher.publish(message)
+        except RuntimeError:
+            if rclpy.ok():  # if not, ROS has ended before the node
+                raise
+
+    def listeners(self, topic: Topic) -> int:
+        """Count those who listen."""
+        publisher = self._publishers.get(topic.name)
+        return publisher.get_subscription_count() if publisher is not None and rclpy.ok() else 0
+
+    def log(self, gravity: Severity, text: str) -> None:
+        """Write to the console and to rosout."""
+        # rclpy refuses a second severity from the same place in the code.
+        if gravity is Severity.ERROR:
+            self._owner.get_logger().error(text)
+        elif gravity is Severity.WARNING:
+            self._owner.get_logger().warning(text)
+        else:
+            self._owner.get_logger().info(text)
+
+    def _find(self, kind: str, type_name: str, name: str) -> Any | None:
+        found = find(kind, type_name)
+        if found is None:
+            self.log(Severity.INFO, f"without {name}: this ROS 2 has no {type_name}")
+        return found
+
+    def _hear(self, node: Node, heard: Heard, topic: Topic, message: Any) -> None:
+        # What is latched comes once: who ignored it before being active would never have it.
+        if self._is_active or topic.delivery in LATCHED:
+            node.hear(heard, message)
+
+    def _answer(self, node: Node, heard: Heard, name: str, request: Any, response: Any) -> Any:
+        if self._is_active:
+            node.hear(heard, getattr(request, "pose", None))
+        else:
+            self.log(Severity.WARNING, f"{name} has no effect: firstfix is not active")
+        return response

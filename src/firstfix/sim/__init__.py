@@ -1,1 +1,0 @@
-"""A robot to try it on."""

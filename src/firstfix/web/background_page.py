@@ -1,0 +1,81 @@
+"""The page of a robot on a network, served in a thread beside its node."""
+
+from __future__ import annotations
+
+import threading
+from socket import socket
+
+from firstfix.core.errors import InputError
+from firstfix.localizer.inputs import Input
+from firstfix.ros.node import Node
+from firstfix.ros.node_config import NodeConfig
+from firstfix.ros.transport import Transport
+from firstfix.web.feed import Feed
+from firstfix.web.guard import Access
+from firstfix.web.page import Page
+from firstfix.web.server import make_server
+from firstfix.web.steering import Steering
+
+_END_S = 5.0
+
+
+class PageBeside:
+    """Serves the page while it exists as a context; `make_node` makes nodes that it shows.
+
+    Parameters
+    ----------
+    robot : str
+        ros1, ros2 or dds.
+    map_name : str
+        What the map is called.
+    access : Access
+        What is asked of viewers.
+    listening : socket
+        Where they come in.
+    """
+
+    def __init__(self, robot: str, map_name: str, access: Access, listening: socket) -> None:
+        self._feed = Feed(map_name)
+        self._node: Node | None = None
+        self._server = make_server(
+            Page(robot, self._feed, Steering(self._feed, self._give), access)
+        )
+        serve = {"sockets": [listening]}
+        self._thread = threading.Thread(
+            target=self._server.run, kwargs=serve, name="page", daemon=True
+        )
+
+    def __enter__(self) -> PageBeside:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._server.should_exit = True
+        self._thread.join(_END_S)
+
+    def make_node(self, config: NodeConfig, transport: Transport) -> Node:
+        """Make a node that the page shows from now on.
+
+        Parameters
+        ----------
+        config : NodeConfig
+            Its settings.
+        transport : Transport
+            What it hears and speaks through.
+
+        Returns
+        -------
+        Node
+            Not started yet.
+        """
+        self._node = Node(config, transport, [self._feed])
+        return self._node
+
+    def _give(self, given: Input) -> None:
+        if self._node is None:
+            raise InputError(
+                expected="a node that is configured",
+                received="one that is not yet",
+                remedy="configure it: ros2 lifecycle set /firstfix configure",
+            )
+        self._node.give(given)

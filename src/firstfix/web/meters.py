@@ -1,0 +1,51 @@
+"""What the localizer takes: processor time for a scan, and time until it has found the robot."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections import deque
+
+from firstfix.core.scan import LaserScan
+from firstfix.localizer.inputs import Input, NewMap
+from firstfix.localizer.outputs import InitialPose, Output
+from firstfix.localizer.states import State
+
+_SCANS = 50
+
+
+class Meters:
+    """Measures the thread that calls it, between one input and the next."""
+
+    def __init__(self) -> None:
+        self.time_to_fix_s: float | None = None
+        self._cpu_s: deque[float] = deque(maxlen=_SCANS)
+        self._spent_s = 0.0
+        self._left_at_s = 0.0
+        self._began: float | None = None
+
+    @property
+    def cpu_ms(self) -> float | None:
+        """Processor time for a scan and what came with it, median of the last ones, ms."""
+        return 1e3 * statistics.median(self._cpu_s) if self._cpu_s else None
+
+    def count(self, given: Input, outputs: list[Output], state: State, *, is_lifted: bool) -> None:
+        """Take down what an input took, and what came of it; ``state`` is that before it."""
+        self._spent_s += time.thread_time() - self._left_at_s
+        if is_lifted or state in {State.LOCALIZED, State.NO_MAP}:
+            self._began = None
+        elif isinstance(given, LaserScan) and self._began is None:
+            self._began = given.stamp
+        for output in outputs:
+            if isinstance(output, InitialPose) and self._began is not None:
+                # From the first scan to the one that settled it, and what that took to look at.
+                self.time_to_fix_s = output.stamp - self._began + self._spent_s
+                self._began = None
+        if isinstance(given, LaserScan):
+            self._cpu_s.append(self._spent_s)
+        if isinstance(given, LaserScan | NewMap):
+            self._spent_s = 0.0
+
+    def leave(self) -> None:
+        """Say that what the thread does from here to the next input is its work."""
+        self._left_at_s = time.thread_time()

@@ -1,0 +1,169 @@
+"""Trajectories as `evo` reads them: what is written comes back, and nothing else comes in."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
+
+from firstfix.core.angles import angle_error
+from firstfix.core.errors import InputError
+from firstfix.core.trajectory import Trajectory
+from firstfix.io.logs import tum
+from firstfix.io.logs.tum import load_tum, save_tum
+
+PATH = Trajectory(
+    np.array([1.0, 1700000000.1234567]), np.array([[1.5, -2.0, 0.0], [0.1, 1e-30, math.pi / 2]])
+)
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@pytest.fixture
+def load(tmp_path):
+    def load(text: str | bytes) -> Trajectory:
+        (tmp_path / "t.tum").write_bytes(text.encode() if isinstance(text, str) else text)
+        return load_tum(tmp_path / "t.tum")
+
+    return load
+
+
+def test_the_lines_are_the_formats(tmp_path):
+    save_tum(tmp_path / "t.tum", PATH)
+    comment, first, second = (tmp_path / "t.tum").read_text().splitlines()
+    assert comment == "# timestamp tx ty tz qx qy qz qw"
+    assert first == "1.000000000 1.5 -2.0 0.0 0.0 0.0 0.0 1.0"
+    assert second.startswith("1700000000.123456717 0.1 1e-30 0.0 0.0 0.0 0.70710678118654")
+    # As evo does: eight columns separated by one space.
+    table = np.loadtxt(tmp_path / "t.tum", delimiter=" ")
+    assert table.shape == (2, 8)
+    assert_array_equal(table[:, 0], PATH.stamps)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(FINITE, min_size=1, max_size=5).map(sorted),
+    st.lists(st.tuples(FINITE, FINITE, st.floats(-10.0, 10.0)), min_size=5, max_size=5),
+)
+def test_what_is_saved_is_loaded(tmp_path, stamps, poses):
+    saved = Trajectory(np.array(stamps), np.array(poses[: len(stamps)]))
+    save_tum(tmp_path / "t.tum", saved)
+    loaded = load_tum(tmp_path / "t.tum")
+    assert_array_equal(loaded.stamps, saved.stamps)
+    assert_array_equal(loaded.poses[:, :2], saved.poses[:, :2])
+    assert angle_error(loaded.poses[:, 2], saved.poses[:, 2]).max() < 1e-14
+
+
+def test_comments_blank_lines_and_any_white_space(load):
+    text = b"# by somebody, \xe9\r\n\r\n  1 2 3 4 0 0 0 1  \r\n#\n\n2\t3 4 0 0 0 0 -1"
+    assert_array_equal(load(text).poses, [[2, 3, 0], [3, 4, 0]])
+
+
+def test_a_quaternion_of_few_digits_is_normalised(load):
+    yaw = load("0 0 0 0 0 0 0.71 0.71").poses[0, 2]
+    assert yaw == pytest.approx(math.pi / 2)
+
+
+@pytest.mark.parametrize("yaw", [-3.0, -0.5, 0.0, 1.0, math.pi])
+@pytest.mark.parametrize("tilt_deg", [0.0, 3.0, -4.9])
+def test_a_small_tilt_leaves_the_heading(load, yaw, tilt_deg):
+    # A rotation by yaw about z of a robot that pitches: q = q_yaw * q_pitch.
+    c, s, cp, sp = (f(a / 2) for a in (yaw, math.radians(tilt_deg)) for f in (math.cos, math.sin))
+    loaded = load(f"0 0 0 0 {-s * sp} {c * sp} {s * cp} {c * cp}")
+    assert angle_error(float(loaded.poses[0, 2]), yaw) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("1 2 3 4 0 0 1", "eight finite numbers"),
+        ("1 2 3 4 0 0 0 1 9", "eight finite numbers"),
+        ("1,2,3,4,0,0,0,1", "eight finite numbers"),
+        ("1 2 nan 4 0 0 0 1", "eight finite numbers"),
+        ("1 2 inf 4 0 0 0 1", "eight finite numbers"),
+        ("1 2 1e999 4 0 0 0 1", "eight finite numbers"),
+        ("1_0 2 3 4 0 0 0 1", "eight finite numbers"),
+        ("٣ 2 3 4 0 0 0 1", "eight finite numbers"),
+        ("word", "eight finite numbers"),
+        ("1 2 3 4 0 0 0 0", "quaternion"),
+        ("1 2 3 4 0 0 0 5", "of length 5"),
+        ("1 2 3 4 0 0 1e200 1e200", "quaternion"),
+        ("1 2 3 4 0.7071 0 0 0.7071", "a tilt of 90.0°"),
+        ("1 2 3 4 1 0 0 0", "a tilt of 180.0°"),
+        ("1 2 3 4 0 0.05 0 0.9987", "a tilt of 5.7°"),
+        ("-1 2 3 4 0 0 0 1", "-1.0 after 0.0"),
+        ("1" * 5000, "lines of at most 4096 bytes"),
+    ],
+)
+def test_a_bad_line_is_named_by_its_number(load, line, says):
+    with pytest.raises(InputError, match=says) as caught:
+        load(f"# comment\n0 0 0 0 0 0 0 1\n{line}\n")
+    assert "line 3 of " in caught.value.received
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["", "# only a comment\n", "\n\n"])
+def test_a_file_without_poses(load, text):
+    with pytest.raises(InputError, match="at least one pose"):
+        load(text)
+
+
+def test_a_trajectory_without_poses_is_not_saved(tmp_path):
+    with pytest.raises(InputError, match="at least one pose"):
+        save_tum(tmp_path / "t.tum", Trajectory(np.empty(0), np.empty((0, 3))))
+    assert not (tmp_path / "t.tum").exists()
+
+
+def test_more_poses_than_memory_should_hold(load, monkeypatch):
+    monkeypatch.setattr(tum, "MAX_POSES", 3)
+    assert len(load("0 0 0 0 0 0 0 1\n" * 3)) == 3
+    with pytest.raises(InputError, match="at most 3 poses"):
+        load("0 0 0 0 0 0 0 1\n" * 4)
+
+
+def test_an_endless_line_is_not_read_to_its_end(load):
+    with pytest.raises(InputError, match="line 1 of"):
+        load(bytes(10_000_000))
+
+
+@pytest.mark.parametrize("name", ["missing.tum", "."])
+def test_what_is_no_file(tmp_path, name):
+    with pytest.raises(InputError, match="expected a TUM trajectory, received no file"):
+        load_tum(tmp_path / name)
+
+
+def test_an_error_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
+    save_tum(tmp_path / "t.tum", PATH)
+
+    def refuse(*_args):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", refuse)
+    with pytest.raises(InputError, match="No space left"):
+        save_tum(tmp_path / "t.tum", Trajectory(np.zeros(1), np.zeros((1, 3))))
+    assert_array_equal(load_tum(tmp_path / "t.tum").stamps, PATH.stamps)
+    assert [path.name for path in tmp_path.iterdir()] == ["t.tum"]
+
+
+def test_a_folder_that_does_not_exist(tmp_path: Path):
+    with pytest.raises(InputError, match="No such file"):
+        save_tum(tmp_path / "no folder" / "t.tum", PATH)
+
+
+WORDS = st.sampled_from(["0", "1", "-1", "0.5", "nan", "1e308", "#", "x", "\n", "\0", "1e-320"])
+
+
+@settings(
+    max_examples=2 * settings.default.max_examples,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(st.binary(max_size=80) | st.lists(WORDS, max_size=24).map(lambda w: " ".join(w).encode()))
+def test_any_bytes_become_a_trajectory_or_one_sentence(load, data):
+    refusal = ""
+    try:
+        load(data)
+    except InputError as error:
+        refusal = str(error)
+    assert "\n" not in refusal

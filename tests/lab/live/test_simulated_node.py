@@ -1,0 +1,115 @@
+"""A simulated robot and its localizer live in one thread, in real time."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+from live_lab import until
+
+from firstfix.core.errors import InputError
+from firstfix.core.grid import FREE, OCCUPIED, OccupancyGrid
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.lab.live.simulated_node import SimNode
+from firstfix.lab.live.steered_robot import SimRobot
+from firstfix.lab.worlds.catalog import WORLDS
+from firstfix.localizer.inputs import NewMap, PoseHint
+from firstfix.localizer.localizer import Localizer
+from firstfix.localizer.outputs import InitialPose
+from firstfix.localizer.states import State
+
+HOUSE = WORLDS["house"]()
+
+
+class Diary:
+    """A watcher that takes everything down."""
+
+    def __init__(self) -> None:
+        self.given: list[Any] = []
+        self.outputs: list[Any] = []
+        self.truths: list[SE2] = []
+        self.complaints: list[str] = []
+        self.threads: set[str] = set()
+        self.state = State.NO_MAP
+
+    def __call__(self, given: Any, outputs: list[Any], localizer: Localizer) -> None:
+        self.given.append(given)
+        self.outputs += outputs
+        self.state = localizer.state
+        self.threads.add(threading.current_thread().name)
+
+
+@contextmanager
+def living(grid: OccupancyGrid, robot: SimRobot, *more: Any) -> Iterator[tuple[SimNode, Diary]]:
+    diary = Diary()
+    node = SimNode(grid, robot, [diary, *more], diary.truths.append, diary.complaints.append)
+    node.start()
+    yield node, diary
+    node.stop()
+
+
+def test_it_is_found_and_told_where_it_truly_is():
+    with living(HOUSE, SimRobot(HOUSE, 1)) as (_, diary):
+        until(lambda: diary.state is State.LOCALIZED)
+    assert isinstance(diary.given[0], NewMap)
+    found = next(output for output in diary.outputs if isinstance(output, InitialPose))
+    assert found.T_map_base.distance_to(diary.truths[20]) < 0.1
+    assert diary.threads == {"firstfix"}
+    assert diary.complaints == []
+
+
+def test_what_is_given_is_taken_at_once_also_while_the_robot_is_paused():
+    robot = SimRobot(HOUSE, 1)
+    with living(HOUSE, robot) as (node, diary):
+        until(lambda: diary.state is State.LOCALIZED)
+        robot.pause()
+        hint = PoseHint(0.0, SE2(1.0, 1.0, 0.0))
+        node.give(hint)
+        until(lambda: hint in diary.given)
+        assert diary.state is State.TRACKING
+        robot.go_on()
+        until(lambda: diary.state is State.LOCALIZED)
+
+
+def test_what_goes_wrong_is_told_and_it_goes_on():
+    wrong = iter(["once"])
+
+    def stumbles(given: Any, *_: Any) -> None:
+        if isinstance(given, LaserScan) and next(wrong, None):
+            raise RuntimeError("over its own feet")
+
+    with living(HOUSE, SimRobot(HOUSE, 1), stumbles) as (_, diary):
+        until(lambda: diary.complaints)
+        until(lambda: sum(isinstance(given, LaserScan) for given in diary.given) > 3)
+    assert len(diary.complaints) == 1
+    assert "over its own feet" in diary.complaints[0]
+
+
+def test_a_map_in_which_nothing_can_be_found_is_told():
+    cells = np.full((100, 100), FREE, np.int8)
+    bare = OccupancyGrid(cells, 0.05)
+    with living(bare, SimRobot(bare, 1)) as (_, diary):
+        until(lambda: diary.complaints)
+        assert "wall" in diary.complaints[0]
+
+
+def test_the_same_seed_gives_the_same_first_pose():
+    poses = []
+    for _ in range(2):
+        with living(HOUSE, SimRobot(HOUSE, 7)) as (_, diary):
+            until(lambda diary=diary: diary.state is State.LOCALIZED)
+        first = next(output for output in diary.outputs if isinstance(output, InitialPose))
+        poses.append(first.T_map_base)
+    assert poses[0] == poses[1]
+
+
+def test_a_building_without_room_is_refused():
+    cells = np.full((10, 10), OCCUPIED, np.int8)
+    cells[4:6, 4:6] = FREE
+    with pytest.raises(InputError, match="free place"):
+        SimRobot(OccupancyGrid(cells, 0.05), 1)

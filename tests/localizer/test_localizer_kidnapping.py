@@ -1,0 +1,133 @@
+"""Who is lifted, carried, pushed or beamed away is found again, and no wrong pose is published."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from firstfix.core.odometry import Odometry, Signal, SignalKind
+from firstfix.core.se2 import SE2
+from firstfix.lab.scenarios.phases import CarryTo, DriveTo, Stand, Teleport
+from firstfix.lab.scenarios.scenario import Scenario, run
+from firstfix.localizer.inputs import NewMap
+from firstfix.localizer.localizer import Localizer
+from firstfix.localizer.outputs import InitialPose, Status, TrackedPose
+from firstfix.localizer.states import State
+
+HERE, THERE = SE2(4.0, 3.0, 1.0), SE2(7.5, 1.2, -2.0)  # `in_hall` stands here
+A_STEP, A_TURN = SE2(0.05, 0.0, 0.05), SE2(0.0, 0.0, 0.1)
+
+
+@pytest.mark.parametrize("kind", [SignalKind.WHEEL_DROP, SignalKind.PICKED_UP, SignalKind.CLIFF])
+def test_who_is_lifted_says_nothing_until_set_down_and_then_where(in_hall, kind, kinds, is_at):
+    (status,) = in_hall.tell(Signal(in_hall.stamp, kind, active=True))
+    assert status.state is State.SEARCHING
+    assert kind.value in status.reason
+    assert in_hall.localizer.particles is None
+    in_hall.pose = THERE
+    assert in_hall.ticks(20) == []
+    assert in_hall.tell(Signal(in_hall.stamp, kind, active=False)) == []
+    outputs = in_hall.tick()
+    assert kinds(outputs) == [InitialPose, TrackedPose, Status]
+    assert is_at(outputs[0].T_map_base, THERE)
+
+
+def test_a_robot_stands_when_the_last_of_its_sensors_says_so(in_hall, kinds):
+    for kind in (SignalKind.CLIFF, SignalKind.WHEEL_DROP):
+        in_hall.tell(Signal(in_hall.stamp, kind, active=True))
+    in_hall.tell(Signal(in_hall.stamp, SignalKind.CLIFF, active=False))
+    assert in_hall.ticks(3) == []
+    in_hall.tell(Signal(in_hall.stamp, SignalKind.WHEEL_DROP, active=False))
+    assert InitialPose in kinds(in_hall.tick())
+
+
+def test_a_bumper_is_no_kidnapping(in_hall, kinds):
+    for active in (True, False):
+        assert in_hall.tell(Signal(in_hall.stamp, SignalKind.BUMPER, active=active)) == []
+        assert kinds(in_hall.tick()) == [TrackedPose, Status]
+
+
+def test_who_hangs_in_the_air_when_the_map_comes_is_not_searched(hall_plan, robot_in, poses):
+    robot = robot_in(hall_plan, HERE)
+    robot.localizer = Localizer()
+    robot.tell(Signal(99.0, SignalKind.WHEEL_DROP, active=True))
+    robot.tell(NewMap(99.5, hall_plan))
+    assert poses(robot.ticks(3)) == []
+
+
+def test_a_scan_from_the_hands_is_not_used_after_the_robot_is_set_down(in_hall, poses):
+    in_hall.tell(Signal(in_hall.stamp, SignalKind.WHEEL_DROP, active=True))
+    in_hall.stamp += 0.1
+    assert in_hall.tell(in_hall.scan()) == []
+    in_hall.tell(Signal(in_hall.stamp + 0.01, SignalKind.WHEEL_DROP, active=False))
+    assert poses(in_hall.tell(Odometry(in_hall.stamp + 0.02, in_hall.T_odom_base))) == []
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_silent_kidnapping_is_noticed_and_no_wrong_pose_is_published(
+    robot_in, office, seed, of, is_at, office_poses
+):
+    """Odometry is continuous, no signal: the scans alone tell."""
+    start, goal = office_poses(office, 2, 100 + seed)
+    assert start.distance_to(goal) > 1.0
+    robot = robot_in(office, start, seed=seed)
+    robot.ticks(4, A_STEP)
+    robot.pose = goal
+    outputs = robot.ticks(30, A_TURN)
+    (found,) = of(InitialPose, outputs)
+    assert found.stamp - outputs[0].stamp < 3.0
+    moved = SE2(0.0, 0.0, 0.1 * round((found.stamp - 100.4) / 0.1))
+    assert is_at(found.T_map_base, goal @ moved)
+    later = [tracked for tracked in of(TrackedPose, outputs) if tracked.stamp >= found.stamp]
+    assert all(tracked.T_map_base.distance_to(goal) < 0.1 for tracked in later)
+    for status in of(Status, outputs):  # before that nobody claims that all is well
+        if status.stamp < found.stamp:
+            assert "doubtful" in status.reason
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_story_with_every_kind_of_kidnapping(maps_cache, office, seed, of, is_at):
+    script = [Stand(0.3), DriveTo(seconds=3), Teleport(), Stand(0.5), CarryTo(seconds=1.0)]
+    script += [DriveTo(seconds=3)]
+    localizer = Localizer(cache_dir=maps_cache)
+    localizer.handle(NewMap(0.0, office))
+    found, disturbed = 0, 0
+    for moment in run(Scenario(script), office, seed):
+        disturbed += moment.disturbance is not None
+        outputs = [output for event in moment.events for output in localizer.handle(event)]
+        for pose in of(InitialPose, outputs):
+            assert pose.stamp == moment.stamp
+            assert is_at(pose.T_map_base, moment.T_map_base)
+            found += 1
+    assert disturbed == 2
+    assert found == 3
+    assert localizer.state is State.LOCALIZED
+
+
+def test_a_small_slip_is_mended_without_a_search(
+    robot_in, office, searches, of, is_at, office_poses
+):
+    for seed, pose in enumerate(office_poses(office, 4, 5)):
+        robot = robot_in(office, pose, seed=seed)
+        robot.tick()
+        assert robot.localizer.state is State.LOCALIZED
+        searches.clear()
+        towards = 1.5 * seed
+        robot.pose = pose @ SE2(
+            0.5 * math.cos(towards), 0.5 * math.sin(towards), math.radians(20.0)
+        )
+        outputs = robot.ticks(10)
+        assert searches == []
+        (found,) = of(InitialPose, outputs)
+        assert is_at(found.T_map_base, robot.pose)
+        assert is_at(of(TrackedPose, outputs)[-1].T_map_base, robot.pose)
+
+
+@pytest.mark.parametrize("metres", [0.15, 0.25])
+def test_a_slip_too_small_for_a_doubt_is_mended_although_the_robot_stands(
+    in_hall, metres, of, is_at
+):
+    in_hall.pose = HERE @ SE2(metres, 0.0, math.radians(8.0))
+    outputs = in_hall.ticks(30)
+    assert is_at(of(TrackedPose, outputs)[-1].T_map_base, in_hall.pose, 0.1, 3.0)

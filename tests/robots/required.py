@@ -1,0 +1,14 @@
+"""What FIRSTFIX_REQUIRE turns from a skip into a failure."""
+
+import os
+
+import pytest
+
+REQUIRED = set(filter(None, os.environ.get("FIRSTFIX_REQUIRE", "").split(",")))
+
+
+def missing(part: str, why: str) -> None:
+    """Skip for want of a part; fail where FIRSTFIX_REQUIRE says that it must be there."""
+    if part in REQUIRED:
+        pytest.fail(f"FIRSTFIX_REQUIRE asks for {part}: {why}")
+    pytest.skip(why)

@@ -1,0 +1,95 @@
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from firstfix.core.errors import InputError
+from firstfix.ros.dds.domain import domain_settings
+
+
+def configuration(**environment):
+    text = domain_settings(environment).configuration
+    return ElementTree.fromstring(text)  # noqa: S314 - our own text
+
+
+def peers(**environment):
+    return [peer.get("address") for peer in configuration(**environment).iter("Peer")]
+
+
+def test_without_variables_the_robots_of_the_local_network_are_found():
+    assert domain_settings({}).number == 0
+    assert configuration().find("*/Discovery") is None
+    assert configuration().find("*/General") is None
+
+
+def test_the_domain_is_that_of_ros():
+    assert domain_settings({"ROS_DOMAIN_ID": "42"}).number == 42
+    assert domain_settings({"ROS_DOMAIN_ID": ""}).number == 0
+
+
+@pytest.mark.parametrize("text", ["-1", "233", "x", "1.5", "²", "9" * 5000])
+def test_what_is_no_domain_is_refused(text):
+    with pytest.raises(InputError, match="ROS_DOMAIN_ID from 0 to 232"):
+        domain_settings({"ROS_DOMAIN_ID": text})
+
+
+def test_names_of_types_count_whatever_others_say_about_the_types():
+    ignored = configuration().findtext("*/Compatibility/IgnoreTypeInformation")
+    assert ignored is not None
+    assert "1.15" in ignored.split(",")
+
+
+@pytest.mark.parametrize(
+    "environment", [{"ROS_LOCALHOST_ONLY": "1"}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}]
+)
+def test_localhost_means_no_multicast_and_one_peer(environment):
+    root = configuration(**environment)
+    assert root.findtext("*/General/AllowMulticast") == "false"
+    assert root.findtext("*/Discovery/ParticipantIndex") == "auto"
+    assert peers(**environment) == ["localhost"]
+
+
+def test_the_older_variable_counts_where_both_are_set():
+    both = {"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
+    assert peers(**both, ROS_STATIC_PEERS="10.0.0.1") == ["localhost"]
+    assert peers(ROS_LOCALHOST_ONLY="0") == []
+
+
+def test_static_peers_are_looked_for_besides():
+    assert peers(ROS_STATIC_PEERS="10.0.0.1; robot.local ;") == ["10.0.0.1", "robot.local"]
+    reach = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    assert peers(ROS_STATIC_PEERS="a", **{reach: "LOCALHOST"}) == ["localhost", "a"]
+    assert peers(ROS_STATIC_PEERS="a", **{reach: "SYSTEM_DEFAULT"}) == []
+    assert configuration(ROS_STATIC_PEERS="a").find("*/General") is None
+
+
+def test_off_means_to_be_found_by_nobody():
+    root = configuration(ROS_AUTOMATIC_DISCOVERY_RANGE="OFF", ROS_STATIC_PEERS="a")
+    assert root.findtext("*/General/AllowMulticast") == "false"
+    assert root.find("*/Discovery/Tag") is not None
+    assert not list(root.iter("Peer"))
+
+
+def test_a_range_that_does_not_exist_is_refused():
+    with pytest.raises(InputError, match="SUBNET, LOCALHOST, OFF, SYSTEM_DEFAULT"):
+        domain_settings({"ROS_AUTOMATIC_DISCOVERY_RANGE": "MOON"})
+
+
+def test_the_users_own_configuration_has_the_last_word():
+    text = domain_settings({"CYCLONEDDS_URI": "file:///etc/mine.xml"}).configuration
+    assert text.endswith("</CycloneDDS>,file:///etc/mine.xml")
+
+
+def test_what_cyclone_dds_cannot_be_told_is_refused():
+    with pytest.raises(InputError, match="ASCII"):
+        domain_settings({"CYCLONEDDS_URI": "file:///home/zoë/mine.xml"})
+
+
+@given(st.text(st.characters(min_codepoint=32, max_codepoint=126)))
+def test_peers_cannot_break_the_configuration(text):
+    assert len(peers(ROS_STATIC_PEERS=text)) == sum(bool(p.strip()) for p in text.split(";"))
+
+
+def test_dds_is_here_where_it_must_be(dds):
+    assert dds.domain > 0  # other modules of tests are passed over where it is missing

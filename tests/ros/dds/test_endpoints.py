@@ -1,0 +1,148 @@
+import pytest
+
+pytest.importorskip("cyclonedds")
+
+from cyclonedds.domain import Domain, DomainParticipant
+from dds_lab import LOOPBACK, free_domain, wait_for
+
+from firstfix.ros.channels import Delivery, Topic
+from firstfix.ros.dds.endpoints import Receiver, Sender, Watch
+from firstfix.ros.dds.types import decode, make
+
+RELIABLE = Topic("flag", "std_msgs/Bool", Delivery.RELIABLE)
+LATCHED = Topic("flag", "std_msgs/Bool", Delivery.LATCHED)
+SENSOR = Topic("flag", "std_msgs/Bool", Delivery.SENSOR)
+YES = make("std_msgs/Bool", data=True)
+
+
+@pytest.fixture
+def other(dds):
+    """A participant besides that of the lab, in the same domain."""
+    return DomainParticipant(dds.domain)
+
+
+def matched(sender):
+    return sender.entity.get_matched_subscriptions
+
+
+def test_what_is_sent_arrives_elsewhere_and_not_here(dds, other):
+    sender = Sender(dds.participant, RELIABLE, "rt/flag")
+    here = Receiver(dds.participant, RELIABLE, "rt/flag")
+    there = Receiver(other, RELIABLE, "rt/flag")
+    wait_for(matched(sender))
+    sender.send(YES)
+    data = wait_for(there.take)
+    assert [decode("std_msgs/Bool", one).data for one in data] == [True]
+    assert here.take() == []
+    assert there.name == "/flag"
+
+
+def test_only_latched_topics_reach_those_who_come_late(dds, other):
+    sender = Sender(dds.participant, LATCHED, "rt/latched")
+    volatile = Sender(dds.participant, RELIABLE, "rt/volatile")
+    for value in (True, False):
+        sender.send(make("std_msgs/Bool", data=value))
+        volatile.send(make("std_msgs/Bool", data=value))
+    late = Receiver(other, LATCHED, "rt/latched")
+    late_too = Receiver(other, RELIABLE, "rt/volatile")
+    (data,) = wait_for(late.take)
+    assert decode("std_msgs/Bool", data).data is False  # the last one
+    wait_for(matched(volatile))
+    assert late_too.take() == []
+
+
+def test_the_last_of_each_sender_reaches_those_who_come_late(dds, other):
+    many = Topic("static", "tf2_msgs/TFMessage", Delivery.LATCHED_MANY)
+    message = make("tf2_msgs/TFMessage", transforms=[])
+    senders = [Sender(p, many, "rt/static") for p in (dds.participant, other)]
+    for sender in senders:
+        sender.send(message)
+    late = Receiver(DomainParticipant(dds.domain), many, "rt/static")
+    heard = []
+    wait_for(lambda: heard.extend(late.take()) or len(heard) == 2)
+
+
+def test_a_sender_that_goes_leaves_no_message(dds, other):
+    receiver = Receiver(other, LATCHED, "rt/flag")
+    sender = Sender(dds.participant, LATCHED, "rt/flag")
+    sender.send(YES)
+    wait_for(receiver.take)
+    sender.entity._delete(sender.entity._ref)
+    wait_for(lambda: not receiver.entity.get_matched_publications())
+    assert receiver.take() == []
+
+
+@pytest.mark.parametrize("offered", [SENSOR, RELIABLE, LATCHED])
+def test_sensors_are_heard_however_they_publish(dds, other, offered):
+    sender = Sender(dds.participant, offered, "rt/scan")
+    receiver = Receiver(other, SENSOR, "rt/scan")
+    wait_for(matched(sender))
+    sender.send(YES)
+    wait_for(receiver.take)
+
+
+@pytest.mark.parametrize(
+    ("offered", "asked", "policy"),
+    [(RELIABLE, LATCHED, "durability"), (SENSOR, RELIABLE, "reliability")],
+)
+def test_both_ends_say_in_which_policy_they_do_not_fit(dds, other, offered, asked, policy):
+    sender = Sender(dds.participant, offered, "rt/flag")
+    receiver = Receiver(other, asked, "rt/flag")
+    assert f"a publisher does not fit in {policy}: " in wait_for(receiver.look)
+    assert f"a subscriber does not fit in {policy}: " in wait_for(sender.look)
+    assert receiver.look() is None  # once is enough
+    assert sender.look() is None
+
+
+def test_an_end_that_fits_has_nothing_to_say(dds, other):
+    sender = Sender(dds.participant, RELIABLE, "rt/flag")
+    receiver = Receiver(other, RELIABLE, "rt/flag")
+    wait_for(matched(sender))
+    assert (sender.look(), receiver.look()) == (None, None)
+
+
+def test_listeners_count_when_they_have_had_time_to_find_the_sender(dds, other, monkeypatch):
+    sender = Sender(dds.participant, RELIABLE, "rt/flag")
+    receiver = Receiver(other, RELIABLE, "rt/flag")
+    wait_for(matched(sender))
+    monkeypatch.setattr("firstfix.ros.dds.endpoints._SETTLING_S", 1e9)
+    sender.look()
+    assert sender.listeners == 0
+    monkeypatch.setattr("firstfix.ros.dds.endpoints._SETTLING_S", 0.0)
+    assert sender.listeners == 1
+    receiver.entity._delete(receiver.entity._ref)
+    wait_for(lambda: sender.look() or sender.listeners == 0)
+
+
+def test_domains_do_not_hear_each_other(dds):
+    number = free_domain()
+    elsewhere = Domain(number, LOOPBACK)
+    far = Receiver(DomainParticipant(number), LATCHED, "rt/flag")
+    near = Receiver(DomainParticipant(dds.domain), LATCHED, "rt/flag")
+    Sender(dds.participant, LATCHED, "rt/flag").send(YES)
+    wait_for(near.take)
+    assert far.take() == []
+    del elsewhere
+
+
+def test_a_watch_looks_at_news_and_survives_a_fault(dds, other):
+    sender = Sender(dds.participant, RELIABLE, "rt/flag")
+    receiver = Receiver(other, RELIABLE, "rt/flag")
+    heard, complaints = [], []
+
+    def look():
+        heard.extend(receiver.take())
+        if len(heard) == 1:
+            raise OSError("no such luck")
+
+    watch = Watch(other, [receiver.news], look, lambda *what: complaints.append(what))
+    wait_for(matched(sender))
+    sender.send(YES)
+    ((subject, text),) = wait_for(lambda: complaints)
+    assert subject == "dds"
+    assert "no such luck" in text
+    sender.send(YES)
+    wait_for(lambda: len(heard) == 2)
+    watch.close()
+    sender.send(YES)
+    assert wait_for(receiver.take)

@@ -1,0 +1,45 @@
+import pytest
+
+pytest.importorskip("cyclonedds")
+
+from cyclonedds.qos import Policy
+
+from firstfix.ros.channels import PARTICLES, Delivery, Heard, Topic, heard_topics, said_topics
+from firstfix.ros.dds.qos import quality
+from firstfix.ros.dds.types import type_hash
+from firstfix.ros.node_config import Mode, NodeConfig
+
+HEARD = heard_topics(NodeConfig())
+
+
+@pytest.mark.parametrize(
+    ("heard", "reliable", "latched", "depth"),
+    [
+        (Heard.SCAN, False, False, 5),
+        (Heard.ODOM, False, False, 5),
+        (Heard.MAP, True, True, 1),
+        (Heard.TF, True, False, 100),
+        (Heard.TF_STATIC, True, True, 100),
+        (Heard.INITIAL_POSE, True, False, 10),
+        (Heard.WHEEL_DROP, True, False, 10),
+    ],
+)
+def test_topics_are_delivered_as_nav2_delivers_them(heard, reliable, latched, depth):
+    policies = set(quality(HEARD[heard]))
+    assert (Policy.Reliability.BestEffort not in policies) is reliable
+    assert (Policy.Durability.TransientLocal in policies) is latched
+    assert Policy.History.KeepLast(depth) in policies
+
+
+def test_everything_travels_as_plain_cdr_and_is_not_heard_here():
+    topics = [*HEARD.values(), *said_topics(NodeConfig(mode=Mode.FULL), PARTICLES)]
+    for topic in topics:
+        policies = set(quality(topic))
+        assert Policy.DataRepresentation(use_cdrv0_representation=True) in policies
+        assert Policy.IgnoreLocal.Participant in policies
+
+
+def test_endpoints_tell_the_hash_of_their_type():
+    topic = Topic("flag", "std_msgs/Bool", Delivery.RELIABLE)
+    told = next(p.data for p in quality(topic) if isinstance(p, Policy.Userdata))
+    assert told.decode() == f"typehash={type_hash('std_msgs/Bool')};"

@@ -1,0 +1,275 @@
+"""The life of the node, over a stand-in for rclpy: see its docstring for what that proves."""
+
+import math
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from ros2_lab import T_ODOM_BASE, Lab, Robot, wait_until
+
+from firstfix.core.angles import angle_error
+from firstfix.core.errors import InputError
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.se2 import SE2
+from firstfix.io.ros_messages.incoming import to_planar, to_pose, to_transform
+from firstfix.ros.parameters import parameters
+
+POSE = "geometry_msgs/PoseWithCovarianceStamped"
+STATUS = "diagnostic_msgs/DiagnosticArray"
+HERE = SE2(3.0, 2.5, 0.4)
+
+
+@pytest.fixture
+def lab(monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
+    made = Lab(monkeypatch)
+    yield made
+    made.end()
+
+
+def is_near(message, truth: SE2) -> bool:
+    pose = to_planar(to_pose(message))
+    return math.hypot(pose.x - truth.x, pose.y - truth.y) < 0.1 and (
+        angle_error(pose.yaw, truth.yaw) < 0.05
+    )
+
+
+def succeeds(lab: Lab, *results) -> bool:
+    return all(result is lab.lifecycle.TransitionCallbackReturn.SUCCESS for result in results)
+
+
+def test_a_robot_is_found_and_amcl_is_told_once(lab: Lab, hall_plan: OccupancyGrid) -> None:
+    node = lab.node()
+    robot = Robot(lab, hall_plan, HERE)
+    told = lab.hears("initialpose", POSE)
+    status = lab.hears("localization_status", STATUS, is_latched=True)
+    assert succeeds(lab, node.trigger_configure(), node.trigger_activate())
+    robot.look_until(lambda: any(s.status[0].level == b"\0" for s in status))
+    for _ in range(5):
+        robot.look()
+    assert len(told) == 1
+    assert is_near(told[0], HERE)
+    assert told[0].header.frame_id == "map"
+    assert any("LOCALIZED" in line.upper() for line in lab.world.lines("info"))
+    assert not lab.world.lines("error")
+
+
+def test_without_amcl_it_follows_the_robot(lab: Lab, hall_plan: OccupancyGrid) -> None:
+    node = lab.node("-p", "mode:=full")
+    robot = Robot(lab, hall_plan, HERE)
+    poses = lab.hears("amcl_pose", POSE, is_latched=True)
+    moved = lab.hears("/tf", "tf2_msgs/TFMessage", depth=100)
+    clouds = lab.hears("particle_cloud", "nav2_msgs/ParticleCloud", is_sensor=True)
+    assert succeeds(lab, node.trigger_configure(), node.trigger_activate())
+    robot.look_until(lambda: poses and clouds)
+    assert is_near(poses[-1], HERE)
+    ours = [m.transforms[0] for m in moved if m.transforms[0].header.frame_id == "map"]
+    T_map_odom = to_planar(to_transform(ours[-1]))
+    found = T_map_odom @ T_ODOM_BASE
+    assert math.hypot(found.x - HERE.x, found.y - HERE.y) < 0.1
+    assert sum(particle.weight for particle in clouds[-1].particles) == pytest.approx(1.0)
+
+
+def test_without_nav2_msgs_clouds_are_poses(
+    monkeypatch: pytest.MonkeyPatch, hall_plan: OccupancyGrid
+) -> None:
+    lab = Lab(monkeypatch, optional=())
+    node = lab.node("-p", "mode:=full")
+    robot = Robot(lab, hall_plan, HERE)
+    clouds = lab.hears("particle_cloud", "geometry_msgs/PoseArray", is_sensor=True)
+    assert succeeds(lab, node.trigger_configure(), node.trigger_activate())
+    robot.look_until(lambda: clouds)
+    lab.end()
+    missing = " ".join(lab.world.lines("info"))
+    assert "without events/cliff: this ROS 2 has no kobuki/CliffEvent" in missing
+    assert "without set_initial_pose" in missing
+    assert "set_initial_pose" not in lab.world.services
+
+
+def test_it_is_silent_and_deaf_unless_active(lab: Lab, hall_plan: OccupancyGrid) -> None:
+    node = lab.node("-p", "mode:=full")
+    robot = Robot(lab, hall_plan, HERE)
+    poses = lab.hears("amcl_pose", POSE, is_latched=True)
+    moved = lab.hears("/tf", "tf2_msgs/TFMessage", depth=100)
+    node.trigger_configure()
+    for _ in range(20):
+        robot.look()
+    node.trigger_activate()
+    assert not poses
+    robot.look_until(lambda: len(poses) > 2)
+    node.trigger_deactivate()
+    said = len(poses), len([m for m in moved if m.transforms[0].header.frame_id == "map"])
+    for _ in range(20):
+        robot.look()
+    node.trigger_activate()
+    before = len(poses), len([m for m in moved if m.transforms[0].header.frame_id == "map"])
+    assert before == said
+    robot.look_until(lambda: len(poses) > said[0])
+    assert is_near(poses[-1], HERE)
+
+
+def test_what_is_latched_is_heard_before_it_is_active(lab: Lab, hall_plan: OccupancyGrid) -> None:
+    node = lab.node()
+    Robot(lab, hall_plan, HERE)
+    node.trigger_configure()
+    wait_until(lambda: any("SEARCHING" in line.upper() for line in lab.world.lines("info")))
+
+
+def test_only_an_active_node_misses_scans(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firstfix.ros.node._LOOK_S", 0.05)
+    node = lab.node()
+    node.trigger_configure()
+    (worker,) = [thread for thread in threading.enumerate() if thread.name == "firstfix"]
+    worker.join(0.5)
+    assert not lab.world.lines("warning")
+    node.trigger_activate()
+    wait_until(lambda: any("nothing heard on scan" in w for w in lab.world.lines("warning")))
+
+
+def test_all_is_given_back_and_it_can_be_configured_anew(
+    lab: Lab, hall_plan: OccupancyGrid
+) -> None:
+    node = lab.node()
+    robot = Robot(lab, hall_plan, HERE)
+    others = len(lab.world.ends)
+    for transition in ("configure", "activate", "deactivate", "cleanup"):
+        assert succeeds(lab, getattr(node, f"trigger_{transition}")())
+    assert len(lab.world.ends) == others
+    assert lab.world.services == {}
+    node.set_parameter("mode", "full")
+    poses = lab.hears("amcl_pose", POSE, is_latched=True)
+    assert succeeds(lab, node.trigger_configure(), node.trigger_activate())
+    robot.look_until(lambda: poses)
+    assert succeeds(lab, node.trigger_shutdown())
+    assert len(lab.world.ends) == others + 1
+    robot.look()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("mode:=fast", "bootstrap"),
+        ("mode:=off", "bootstrap"),
+        ("max_beams:=1", "max_beams"),
+        ("z_hit:=1.5", "z_hit"),
+        ("min_particles:=5000", "max_particles"),
+        ("base_frame_id:=7", "base_frame_id"),
+        ("initial_pose.x:=here", "initial_pose.x"),
+        ("yaml_filename:=nowhere.yaml", "nowhere.yaml"),
+        ("scan_topic:=front scan", "front scan"),
+    ],
+)
+def test_a_bad_parameter_is_told_in_one_line(lab: Lab, given: str, words: str) -> None:
+    node = lab.node("-p", given)
+    assert node.trigger_configure() is lab.lifecycle.TransitionCallbackReturn.FAILURE
+    (line,) = lab.world.lines("error")
+    assert words in line
+    assert "\n" not in line
+    assert node.state == "unconfigured"
+    assert lab.world.ends == []
+
+
+def test_a_bad_parameter_can_be_put_right(lab: Lab) -> None:
+    node = lab.node("-p", "max_beams:=1")
+    node.trigger_configure()
+    node.set_parameter("max_beams", 30)
+    assert succeeds(lab, node.trigger_configure())
+
+
+def test_whole_numbers_stand_for_lengths(lab: Lab) -> None:
+    node = lab.node("-p", "laser_max_range:=12")
+    assert succeeds(lab, node.trigger_configure())
+
+
+def test_unknown_parameters_are_named(lab: Lab, tmp_path: Path) -> None:
+    (tmp_path / "nav2.yaml").write_text(
+        "firstfix:\n  ros__parameters:\n    use_sim_time: true\n    max_beam: 30\n"
+        "    initial_pose: {x: 1.0, y: 2.0, z: 0.0, yaw: 0.0}\n    autostart: true\n"
+    )
+    node = lab.node("--params-file", str(tmp_path / "nav2.yaml"))
+    assert succeeds(lab, node.trigger_configure())
+    (line,) = lab.world.lines("warning")
+    assert "max_beam" in line
+    assert "max_beams" in line
+    assert node.get_parameter("use_sim_time").value is True
+    assert node.get_parameter("initial_pose.y").value == 2.0
+
+
+def test_an_error_of_our_own_is_not_dropped(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    node = lab.node()
+    monkeypatch.setattr(node, "create_service", None)
+    assert node.trigger_configure() is lab.lifecycle.TransitionCallbackReturn.ERROR
+    assert "Traceback" in lab.world.lines("error")[0]
+    assert node.state == "unconfigured"
+    assert lab.world.ends == []
+
+
+def test_a_package_that_is_needed_is_named(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "tf2_msgs.msg")
+    monkeypatch.delitem(sys.modules, "tf2_msgs")
+    monkeypatch.setattr(sys, "path", [p for p in sys.path if "dist-packages" not in p])
+    node = lab.node()
+    assert node.trigger_configure() is lab.lifecycle.TransitionCallbackReturn.FAILURE
+    assert "ros-$ROS_DISTRO-tf2-msgs" in lab.world.lines("error")[0]
+
+
+def test_every_parameter_is_declared_with_its_meaning(lab: Lab) -> None:
+    node = lab.node()
+    for parameter in parameters():
+        descriptor = node.describe_parameter(parameter.name)
+        assert node.get_parameter(parameter.name).value == parameter.default
+        assert descriptor.description == parameter.description
+        assert not descriptor.read_only
+    beams, hit = node.describe_parameter("max_beams"), node.describe_parameter("z_hit")
+    assert (beams.integer_range[0].from_value, beams.integer_range[0].to_value) == (2, 20_000)
+    assert (hit.floating_point_range[0].from_value, hit.floating_point_range[0].to_value) == (0, 1)
+    assert node.describe_parameter("alpha1").additional_constraints == "at least 0"
+    assert "full" in node.describe_parameter("mode").additional_constraints
+
+
+def test_run_starts_by_itself_if_asked(lab: Lab, hall_plan: OccupancyGrid) -> None:
+    told = []
+
+    def during_spin(node) -> None:
+        assert node.name == "firstfix"
+        robot = Robot(lab, hall_plan, HERE)
+        told.append(lab.hears("/pose", POSE))
+        robot.look_until(lambda: told[0])
+
+    lab.world.during_spin = during_spin
+    given = ["--ros-args", "-p", "autostart:=true", "-r", "initialpose:=/pose"]
+    lab.ros2.run(given)
+    assert is_near(told[0][0], HERE)
+    assert not lab.rclpy.ok()
+
+
+def test_run_waits_for_a_manager_otherwise(lab: Lab) -> None:
+    states = []
+    lab.world.during_spin = lambda node: states.append(node.state)
+    lab.ros2.run([])
+    assert states == ["unconfigured"]
+
+
+def test_an_impossible_transition_does_not_end_it(lab: Lab) -> None:
+    states = []
+
+    def during_spin(node) -> None:
+        states.append(node.state)
+        if len(states) == 1:
+            node.trigger_activate()
+
+    lab.world.during_spin = during_spin
+    lab.ros2.run([])
+    assert states == ["unconfigured"] * 2
+    assert "no transition activate" in lab.world.lines("error")[0]
+
+
+@pytest.mark.parametrize(
+    "given",
+    [["-p", "mode:=full"], ["_mode:=full"], ["--ros-args", "-p", "mode"], ["--ros-args", "-x"]],
+)
+def test_run_refuses_what_ros_would_pass_over(lab: Lab, given: list[str]) -> None:
+    with pytest.raises(InputError, match="--ros-args"):
+        lab.ros2.run(given)
+    assert not lab.rclpy.ok()

@@ -1,0 +1,144 @@
+"""Services, events and the log of the node, over a stand-in for rclpy."""
+
+import importlib
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from ros2_lab import Lab, Robot
+
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.se2 import SE2
+from firstfix.io.ros_messages.incoming import to_planar, to_pose
+from firstfix.io.ros_messages.outgoing import pose_with_covariance
+from firstfix.ros.channels import PARTICLES, heard_topics, said_topics
+from firstfix.ros.node_config import NodeConfig
+from firstfix.ros.transport import Severity
+
+POSE = "geometry_msgs/PoseWithCovarianceStamped"
+STATUS = "diagnostic_msgs/DiagnosticArray"
+HERE, ELSEWHERE = SE2(3.0, 2.5, 0.4), SE2(7.5, 5.0, -1.5)
+
+
+@pytest.fixture
+def lab(monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
+    made = Lab(monkeypatch)
+    yield made
+    made.end()
+
+
+@pytest.fixture
+def states(lab: Lab, hall_plan: OccupancyGrid) -> tuple[Robot, list[Any]]:
+    """Give a robot that has been found, and a list of all status messages since."""
+    node = lab.node()
+    robot = Robot(lab, hall_plan, HERE)
+    heard = lab.hears("localization_status", STATUS, is_latched=True)
+    node.trigger_configure()
+    node.trigger_activate()
+    robot.look_until(lambda: heard and state_of(heard[-1]) == "LOCALIZED")
+    heard.clear()
+    return robot, heard
+
+
+def state_of(message) -> str:
+    return next(v.value for v in message.status[0].values if v.key == "state").upper()
+
+
+def is_there(message) -> bool:
+    pose = to_planar(to_pose(message))
+    return math.hypot(pose.x - ELSEWHERE.x, pose.y - ELSEWHERE.y) < 0.1
+
+
+def test_a_search_can_be_asked_for(lab: Lab, states) -> None:
+    robot, heard = states
+    lab.world.ask("reinitialize_global_localization")
+    robot.look_until(lambda: any(state_of(m) == "SEARCHING" for m in heard))
+    robot.look_until(lambda: state_of(heard[-1]) == "LOCALIZED")
+
+
+def test_an_update_can_be_asked_for(lab: Lab, states) -> None:
+    robot, heard = states
+    lab.world.ask("request_nomotion_update")
+    robot.look_until(lambda: heard)
+    assert {state_of(m) for m in heard} == {"LOCALIZED"}
+
+
+@pytest.mark.parametrize("way", ["service", "topic"])
+def test_a_person_can_say_where_it_is(lab: Lab, states, way: str) -> None:
+    robot, _ = states
+    told = lab.hears("initialpose", POSE)
+    robot.T_map_base = ELSEWHERE
+    hint = pose_with_covariance(robot.make, robot.stamp, "map", ELSEWHERE, 0.01 * np.eye(3))
+    if way == "service":
+        request = lab.types.find("srv", "nav2_msgs/SetInitialPose").Request(pose=hint)
+        lab.world.ask("set_initial_pose", request)
+    else:
+        lab.says("initialpose", POSE).publish(hint)
+    robot.look_until(lambda: any(message is not hint and is_there(message) for message in told))
+
+
+def test_a_wheel_that_drops_makes_it_search(lab: Lab, states) -> None:
+    robot, heard = states
+    told = lab.hears("initialpose", POSE)
+    wheel = lab.says("events/wheel_drop", "kobuki/WheelDropEvent")
+    wheel.publish(robot.make("kobuki/WheelDropEvent", wheel=0, state=1))
+    robot.T_map_base = ELSEWHERE
+    wheel.publish(robot.make("kobuki/WheelDropEvent", wheel=0, state=0))
+    robot.look_until(lambda: any(is_there(message) for message in told))
+    assert "SEARCHING" in {state_of(m) for m in heard}
+
+
+def test_services_that_come_too_early_have_no_effect(lab: Lab) -> None:
+    lab.node().trigger_configure()
+    lab.world.ask("reinitialize_global_localization")
+    (line,) = lab.world.lines("warning")
+    assert "reinitialize_global_localization has no effect" in line
+
+
+def test_a_transport_logs_with_every_gravity(lab: Lab) -> None:
+    transport = importlib.import_module("firstfix.ros.ros2.transport")
+    made = transport.Ros2(lab.node(), NodeConfig())
+    for gravity in [*Severity, *Severity]:
+        made.log(gravity, gravity.value)
+    assert [how for how, _ in lab.world.log] == ["info", "warning", "error"] * 2
+
+
+def test_what_is_thought_too_late_is_dropped(lab: Lab) -> None:
+    transport = importlib.import_module("firstfix.ros.ros2.transport")
+    config = NodeConfig()
+    made = transport.Ros2(lab.node(), config)
+    topic = said_topics(config, made.particles)[0]
+    message = lab.types.find("msg", topic.type_name)()
+    made.close()
+    made.publish(topic, message)
+    assert made.listeners(topic) == 0
+    again = transport.Ros2(lab.nodes[0], config)
+    lab.nodes[0].on_activate(None)
+    lab.rclpy.try_shutdown()
+    again.publish(topic, message)
+    assert again.listeners(topic) == 0
+
+
+def test_qualities_are_those_that_others_use(lab: Lab) -> None:
+    config = NodeConfig()
+    topics = [*heard_topics(config).values(), *said_topics(config, PARTICLES)]
+    found = {}
+    for topic in topics:
+        quality = lab.types.quality(topic)
+        found[topic.name] = quality.depth, quality.reliability.name, quality.durability.name
+    assert found == {
+        "scan": (5, "BEST_EFFORT", "VOLATILE"),
+        "map": (1, "RELIABLE", "TRANSIENT_LOCAL"),
+        "/tf": (100, "RELIABLE", "VOLATILE"),
+        "/tf_static": (100, "RELIABLE", "TRANSIENT_LOCAL"),
+        "odom": (5, "BEST_EFFORT", "VOLATILE"),
+        "initialpose": (10, "RELIABLE", "VOLATILE"),
+        "events/cliff": (10, "RELIABLE", "VOLATILE"),
+        "events/wheel_drop": (10, "RELIABLE", "VOLATILE"),
+        "events/bumper": (10, "RELIABLE", "VOLATILE"),
+        "kidnapped": (10, "RELIABLE", "VOLATILE"),
+        "hypotheses": (1, "RELIABLE", "TRANSIENT_LOCAL"),
+        "localization_status": (1, "RELIABLE", "TRANSIENT_LOCAL"),
+    }

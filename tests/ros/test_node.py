@@ -1,0 +1,369 @@
+"""A whole node on real messages, with its real worker; only the wire is a recorder."""
+
+import threading
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from recorder import Recorder, Speaker, wait_for
+
+from firstfix.core.errors import InputError, MapError
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.odometry import Odometry
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.io.maps.map_server import save_map
+from firstfix.io.ros_messages.incoming import to_planar, to_pose
+from firstfix.io.ros_messages.outgoing import occupancy_grid, pose_with_covariance
+from firstfix.localizer.inputs import NewMap, PoseHint, Reset
+from firstfix.localizer.states import State
+from firstfix.ros import node as node_module
+from firstfix.ros.channels import AMCL_POSE, INITIAL_POSE, STATUS, Heard
+from firstfix.ros.node import Node
+from firstfix.ros.node_config import Mode, NodeConfig
+from firstfix.ros.transport import Severity
+
+THERE = SE2(4.0, 3.0, 1.0)
+
+
+class Running:
+    """A node, its recorder, and all that its localizer was told and said."""
+
+    def __init__(self, recorder, **settings):
+        self.recorder = recorder
+        self.handled = []
+        self.state = State.NO_MAP
+        self.node = Node(NodeConfig(**settings), recorder, [self._watch])
+        self.hear = self.node.hear
+
+    def _watch(self, given, outputs, localizer):
+        self.handled.append((given, outputs))
+        self.state = localizer.state
+
+    def given(self, kind):
+        return [given for given, _ in self.handled if isinstance(given, kind)]
+
+    def wait_until_handled(self, kind, n=1):
+        wait_for(lambda: len(self.given(kind)) >= n)
+
+
+@pytest.fixture
+def run(recorder):
+    """Give a function that makes a node; all are stopped at the end."""
+    made = []
+
+    def run(to=None, *, start=True, **settings):
+        made.append(Running(to or recorder, **settings))
+        if start:
+            made[-1].node.start()
+        return made[-1]
+
+    yield run
+    for each in made:
+        each.node.stop()
+
+
+@pytest.fixture
+def robot(ros2, hall_plan):
+    return Speaker(ros2, hall_plan, THERE)
+
+
+def introduce(running, robot):
+    """Tell map, place of the laser, and odometry and scan of now."""
+    running.hear(Heard.MAP, robot.map())
+    running.hear(Heard.TF_STATIC, robot.fixed())
+    robot.report(running.hear)
+
+
+# ---- found, and handed over
+
+
+def test_a_robot_is_found_from_its_first_scan(run, robot, recorder):
+    running = run()
+    introduce(running, robot)
+    (message,) = wait_for(lambda: recorder.on(INITIAL_POSE))
+    said = to_pose(message)
+    assert to_planar(said).distance_to(THERE) < 0.1
+    assert said.stamp == robot.stamp
+    wait_for(lambda: running.state is State.LOCALIZED)
+    assert recorder.told(Severity.WARNING) == recorder.told(Severity.ERROR) == []
+
+
+def test_the_same_in_messages_of_ros_1(run, wire, hall_plan):
+    recorder = Recorder(wire)
+    introduce(run(recorder), Speaker(wire, hall_plan, THERE))
+    (message,) = wait_for(lambda: recorder.on(INITIAL_POSE))
+    assert to_planar(to_pose(message)).distance_to(THERE) < 0.1
+
+
+def test_its_own_pose_that_comes_back_is_no_hint(run, robot, recorder):
+    running = run()
+    introduce(running, robot)
+    (own,) = wait_for(lambda: recorder.on(INITIAL_POSE))
+    for _ in range(3):
+        running.hear(Heard.INITIAL_POSE, own)
+        robot.move()
+        robot.report(running.hear)
+    running.wait_until_handled(LaserScan, 2)
+    assert running.given(PoseHint) == []
+    assert running.state is State.LOCALIZED
+    assert len(recorder.on(INITIAL_POSE)) == 1
+
+
+def test_the_pose_of_a_person_is_a_hint(run, robot, ros2):
+    running = run(mode=Mode.FULL)
+    introduce(running, robot)
+    running.hear(Heard.INITIAL_POSE, pose_with_covariance(ros2.make, 0.0, "map", THERE, np.eye(3)))
+    running.wait_until_handled(PoseHint)
+    robot.move()
+    robot.report(running.hear)
+    wait_for(lambda: running.state is State.LOCALIZED and len(running.given(LaserScan)) > 1)
+
+
+def test_a_request_to_search_anew_is_followed(run, robot):
+    running = run(mode=Mode.FULL)
+    introduce(running, robot)
+    wait_for(lambda: running.state is State.LOCALIZED)
+    running.hear(Heard.RESET)
+    running.wait_until_handled(Reset)
+    robot.move()
+    robot.report(running.hear)
+    wait_for(lambda: running.state is State.LOCALIZED)
+
+
+def test_a_clock_set_back_is_survived(run, robot, recorder):
+    running = run(mode=Mode.FULL)
+    introduce(running, robot)
+    wait_for(lambda: running.state is State.LOCALIZED)
+    robot.stamp = 5.0
+    robot.report(running.hear)
+    wait_for(lambda: [m for m in recorder.on(AMCL_POSE) if to_pose(m).stamp == 5.0])
+    assert recorder.told(Severity.WARNING) == ["time went back by 95.0 s: beginning anew"]
+
+
+# ---- threads
+
+
+def test_of_a_burst_no_odometry_is_lost_and_the_newest_scan_is_used(run, robot):
+    running = run(start=False, mode=Mode.FULL)
+    introduce(running, robot)
+    for i in range(1000):
+        robot.move(SE2(0.0, 0.0, 0.001), 0.01)
+        running.hear(Heard.TF, robot.tf())
+        if i % 10 == 9:
+            running.hear(Heard.SCAN, robot.scan())
+    running.node.start()
+    running.wait_until_handled(LaserScan)
+    assert [given.stamp for given in running.given(Odometry)] == pytest.approx(
+        [100.0 + 0.01 * i for i in range(1001)]
+    )
+    assert [given.stamp for given in running.given(LaserScan)] == [robot.stamp]
+    wait_for(lambda: running.state is State.LOCALIZED)
+
+
+def test_callbacks_of_many_threads_are_served_by_one(run, robot, recorder):
+    running = run(mode=Mode.FULL)
+    introduce(running, robot)
+    wait_for(lambda: running.state is State.LOCALIZED)
+
+    def ask() -> None:
+        for _ in range(50):
+            running.hear(Heard.UPDATE)
+            running.hear(Heard.SCAN, robot.scan())
+
+    threads = [threading.Thread(target=ask) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    wait_for(lambda: sum(not isinstance(g, LaserScan) for g, _ in running.handled) >= 202)
+    assert recorder.threads == {"firstfix"}
+    assert recorder.told(Severity.ERROR) == []
+
+
+def test_it_can_be_stopped_before_between_and_after(run):
+    run(start=False).node.stop()
+    for _ in range(3):
+        running = run()
+        running.node.stop()
+        running.node.stop()
+        assert not running.node._worker.is_alive()
+    running.hear(Heard.RESET)  # of a callback that came too late
+
+
+def test_the_end_waits_for_what_is_being_thought_and_begins_nothing_more(run, robot):
+    running = run(mode=Mode.FULL)
+    introduce(running, robot)
+    for _ in range(200):
+        running.hear(Heard.RESET)
+    running.node.stop()
+    assert not running.node._worker.is_alive()
+    handled = len(running.handled)
+    assert handled < 200
+    running.hear(Heard.RESET)
+    assert len(running.handled) == handled
+
+
+def test_the_end_does_not_wait_for_ever(run, robot, recorder, monkeypatch):
+    monkeypatch.setattr(node_module, "_END_S", 0.05)
+    begun, go_on = threading.Event(), threading.Event()
+
+    def think(given, outputs, localizer):
+        begun.set()
+        go_on.wait(60.0)
+
+    node = Node(NodeConfig(), recorder, [think])
+    node.start()
+    node.hear(Heard.MAP, robot.map())
+    assert begun.wait(60.0)
+    node.stop()
+    assert node._worker.is_alive()
+    go_on.set()
+    node._worker.join(60.0)
+    assert not node._worker.is_alive()
+
+
+# ---- errors
+
+
+class Broken(Recorder):
+    """A wire that is cut for one topic."""
+
+    def publish(self, topic, message):
+        if topic is STATUS:
+            raise RuntimeError("the wire is cut")
+        super().publish(topic, message)
+
+
+def test_an_error_of_its_own_ends_nothing_and_is_told_once(run, robot, ros2, monkeypatch):
+    monkeypatch.setattr(node_module, "_REPEAT_S", 1000.0)
+    recorder = Broken(ros2)
+    running = run(recorder, mode=Mode.FULL)
+    introduce(running, robot)
+    for _ in range(5):
+        robot.move()
+        robot.report(running.hear)
+        wait_for(lambda: [m for m in recorder.on(AMCL_POSE) if to_pose(m).stamp == robot.stamp])
+        running.hear(Heard.RESET)
+    (error,) = recorder.told(Severity.ERROR)
+    assert error.startswith("an error of firstfix itself:\nTraceback")
+    assert "the wire is cut" in error
+
+
+def test_nonsense_is_told_in_one_sentence_and_ends_nothing(run, robot, recorder):
+    running = run(mode=Mode.FULL)
+    introduce(running, robot)
+    bad = robot.scan()
+    bad.range_max = 0.0
+    running.hear(Heard.SCAN, bad)
+    warning = wait_for(lambda: recorder.told(Severity.WARNING))[0]
+    assert warning.startswith("expected a range_max above range_min, received")
+    robot.report(running.hear)
+    wait_for(lambda: running.state is State.LOCALIZED)
+
+
+def test_each_subject_is_told_once_in_a_while(run, robot, recorder, monkeypatch):
+    monkeypatch.setattr(node_module, "_REPEAT_S", 1000.0)
+    running = run()
+    running.hear(Heard.MAP, robot.map())
+    for i in range(20):
+        robot.move()
+        running.hear(Heard.TF, robot.tf())
+        running.hear(Heard.SCAN, robot.scan("lidar"))  # nobody knows where that is
+        bad = robot.map()
+        bad.info.width = i  # each time another sentence
+        running.hear(Heard.MAP, bad)
+        running.hear(Heard.UPDATE)
+        wait_for(lambda n=i + 1: len(running.given(Odometry)) == n)
+    about_maps, about_scans = sorted(recorder.told(Severity.WARNING), reverse=True)
+    assert about_maps.startswith("expected 0 x 160 cells")
+    assert about_scans.startswith("1 scans left out so far; the place of the laser is not known")
+
+
+def test_warnings_come_again_when_their_time_is_over(run, recorder, monkeypatch):
+    monkeypatch.setattr(node_module, "_REPEAT_S", 0.0)
+    running = run()
+    for _ in range(3):
+        running.hear(Heard.CLIFF, SimpleNamespace(data="no event"))
+    wait_for(lambda: len(recorder.told(Severity.WARNING)) == 3)
+
+
+def test_silent_topics_are_named_although_others_speak(run, robot, recorder, monkeypatch):
+    monkeypatch.setattr(node_module, "_LOOK_S", 0.05)
+    running = run()
+
+    def speak():
+        robot.move(seconds=0.01)
+        running.hear(Heard.TF, robot.tf())
+        return len(recorder.told(Severity.WARNING)) >= 2
+
+    wait_for(speak)
+    assert sorted(recorder.told(Severity.WARNING)) == [
+        "nothing heard on map (nav_msgs/OccupancyGrid) for 0 s",
+        "nothing heard on scan (sensor_msgs/LaserScan) for 0 s",
+    ]
+
+
+def test_scans_that_need_no_conversion_are_heard_too(run, robot, recorder, monkeypatch, hall_plan):
+    monkeypatch.setattr(node_module, "_LOOK_S", 0.2)
+    running = run(mode=Mode.FULL)
+    running.node.give(NewMap(0.0, hall_plan))
+    running.node.give(Odometry(1.0, SE2.identity()))
+    for _ in range(10):
+        running.node.give(LaserScan(np.ones(9, np.float32), 0.0, 0.1, 0.1, 5.0, stamp=1.0))
+        running.wait_until_handled(LaserScan)
+    assert len(running.given(NewMap)) == 1
+    assert not any("scan" in text for text in recorder.told(Severity.WARNING))
+
+
+# ---- maps
+
+
+def test_a_map_of_its_own_is_read_at_the_start(run, robot, recorder, hall_plan, tmp_path):
+    save_map(hall_plan, tmp_path / "hall.yaml")
+    running = run(yaml_filename=str(tmp_path / "hall.yaml"))
+    running.hear(Heard.TF_STATIC, robot.fixed())
+    robot.report(running.hear)
+    (message,) = wait_for(lambda: recorder.on(INITIAL_POSE))
+    assert to_planar(to_pose(message)).distance_to(THERE) < 0.1
+
+
+def broken_maps(folder):
+    yaml = "image: no.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
+    yaml += "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    (folder / "no_image.yaml").write_text(yaml)
+    (folder / "no_map.yaml").write_text("nothing")
+    empty = OccupancyGrid(np.zeros((20, 20), np.int8), 0.05)
+    save_map(empty, folder / "no_walls.yaml")
+    (folder / "cut.yaml").write_text(yaml.replace("no.pgm", "cut.pgm"))
+    (folder / "cut.pgm").write_bytes(b"P5\n400 400\n255\n" + bytes(1000))
+    return ["missing.yaml", "no_image.yaml", "no_map.yaml", "no_walls.yaml", "cut.yaml", "."]
+
+
+def test_a_map_that_cannot_be_used_is_refused_at_the_start(run, recorder, tmp_path):
+    for name in broken_maps(tmp_path):
+        node = run(start=False, yaml_filename=str(tmp_path / name)).node
+        with pytest.raises(MapError):
+            node.start()
+        node.stop()
+    assert recorder.lines == []
+
+
+def test_a_map_that_cannot_be_searched_leaves_the_one_in_use(run, robot, recorder, ros2):
+    running = run(mode=Mode.FULL)
+    introduce(running, robot)
+    wait_for(lambda: running.state is State.LOCALIZED)
+    empty = OccupancyGrid(np.zeros((20, 20), np.int8), 0.05)
+    running.hear(Heard.MAP, occupancy_grid(ros2.make, 3.0, "map", empty))
+    running.hear(Heard.MAP, robot.map())
+    robot.move()
+    robot.report(running.hear)
+    running.wait_until_handled(LaserScan, 2)
+    assert len(running.given(NewMap)) == 1
+    assert running.state is State.LOCALIZED
+    assert "a map with walls and free space" in recorder.told(Severity.WARNING)[0]
+
+
+def test_settings_out_of_their_range_make_no_node():
+    with pytest.raises(InputError):
+        NodeConfig(status_rate=-1.0)

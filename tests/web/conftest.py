@@ -1,0 +1,65 @@
+"""A real browser and the servers that it visits."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "robots"))
+
+import page_lab
+from recorder import Recorder
+from required import missing
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    """Give a browser; for a module, because its event loop is in the way of others."""
+    if why := page_lab.why_missing():
+        missing("browser", why)
+    with page_lab.chromium() as browser:
+        yield browser
+
+
+@pytest.fixture
+def visit(chromium: Any) -> Iterator[Callable[..., page_lab.Visit]]:
+    """Give a function that opens a page; afterwards nothing may have gone wrong on any."""
+    contexts, visits = [], []
+
+    def open_page(
+        url: str, device: dict[str, Any] = page_lab.DESKTOP, **options: Any
+    ) -> page_lab.Visit:
+        contexts.append(chromium.new_context(**device, **options))
+        visits.append(page_lab.Visit(contexts[-1], url))
+        return visits[-1]
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert [problem for visited in visits for problem in visited.problems] == []
+
+
+@pytest.fixture(scope="module")
+def office_server(chromium: Any) -> Iterator[page_lab.Server]:
+    """Give a robot in an office, where every place is found at once."""
+    server = page_lab.Server("office", "--seed", "1").start()
+    yield server
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def rooms_server(chromium: Any) -> Iterator[page_lab.Server]:
+    """Give a robot in one of four rooms that look the same."""
+    server = page_lab.Server("rooms", "--seed", "1").start()
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def recorder(ros2: Any) -> Recorder:
+    """Give a transport that keeps what is published, with messages of ROS 2."""
+    return Recorder(ros2)

@@ -1,0 +1,71 @@
+"""The page of a robot on a network is served in a thread beside its node."""
+
+from __future__ import annotations
+
+import threading
+
+import httpx
+import numpy as np
+import pytest
+from live_lab import until
+from recorder import Recorder
+
+from firstfix.core.errors import InputError
+from firstfix.core.odometry import Odometry
+from firstfix.core.se2 import SE2
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import WORLDS
+from firstfix.localizer.inputs import NewMap
+from firstfix.ros.node_config import Mode, NodeConfig
+from firstfix.web.background_page import PageBeside
+from firstfix.web.guard import Access
+from firstfix.web.server import listen, url_of
+
+HOUSE = WORLDS["house"]()
+HERE = SE2(3.0, 2.0, 0.5)
+
+
+@pytest.fixture
+def ways(recorder: Recorder):
+    with (
+        listen("127.0.0.1", 0) as listening,
+        PageBeside("dds", "house", Access(), listening) as page,
+        httpx.Client(base_url=url_of(listening), timeout=30.0) as api,
+    ):
+        until(lambda: page._server.started)
+        yield page, api
+
+
+def state(api: httpx.Client) -> str:
+    return api.get("/v1/status").json()["state"]
+
+
+def test_a_node_is_seen_and_steered(ways, recorder: Recorder):
+    page, api = ways
+    assert state(api) == "NO_MAP"
+    node = page.make_node(NodeConfig(mode=Mode.FULL), recorder)
+    node.start()
+    node.give(NewMap(0.0, HOUSE))
+    until(lambda: state(api) == "SEARCHING")
+    node.give(Odometry(1.0, SE2.identity()))
+    node.give(Lidar().scan(HOUSE, HERE, np.random.default_rng(0), stamp=1.0))
+    until(lambda: state(api) == "LOCALIZED")
+    x, y, _ = api.get("/v1/status").json()["pose"]
+    assert (x, y) == pytest.approx((HERE.x, HERE.y), abs=0.1)
+    assert api.get("/v1/map").json()["name"] == "house"
+    assert api.post("/v1/relocalize").status_code == 202
+    until(lambda: state(api) == "SEARCHING")
+    node.stop()
+
+
+def test_before_it_is_configured_there_is_nobody_to_tell(ways):
+    page, _ = ways
+    with pytest.raises(InputError, match="configure"):
+        page._give(NewMap(0.0, HOUSE))
+
+
+def test_it_ends_with_its_context(recorder: Recorder):
+    before = threading.active_count()
+    with listen("127.0.0.1", 0) as listening, PageBeside("dds", "a", Access(), listening):
+        pass
+    assert threading.active_count() == before

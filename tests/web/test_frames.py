@@ -1,0 +1,86 @@
+"""Binary messages say the same as what they are made of."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from live_lab import drive
+
+from firstfix.amcl.particles import equal_weights
+from firstfix.core.se2 import SE2
+from firstfix.global_localization.beams import usable_beams
+from firstfix.web.frames import NO_RETURN, particles_frame, scan_frame
+from firstfix.web.messages import as_text, hello_object, map_object, state_object
+from firstfix.web.view import PlacedParticles, View
+
+
+@pytest.fixture(scope="module")
+def view() -> View:
+    begun = drive()
+    begun.step(30)
+    return begun.feed.view
+
+
+def opened(frame: bytes, columns: int) -> tuple[tuple, np.ndarray, bytes]:
+    kind, version, zero, n, stamp = struct.unpack_from("<BBHId", frame)
+    values = np.frombuffer(frame, "<f4", columns * n, 16).reshape(n, columns)
+    return (kind, version, zero, n, stamp), values, frame[16 + 4 * columns * n :]
+
+
+def test_a_scan_lies_where_it_was_taken(view):
+    header, points, classes = opened(scan_frame(view.placed, view.map), 2)
+    scan = view.placed.scan
+    assert header == (1, 1, 0, len(usable_beams(scan)), scan.stamp)
+    assert len(classes) == header[3]
+    hit = usable_beams(scan).hit
+    expected = view.placed.T_map_base.apply(scan.points())
+    np.testing.assert_allclose(points[hit], expected, atol=1e-4)
+    kinds = np.frombuffer(classes, np.uint8)
+    assert ((kinds == NO_RETURN) == ~hit).all()
+    assert (kinds[hit] == 0).mean() > 0.9
+
+
+def test_beams_without_a_return_end_where_sight_ends(view):
+    _, points, classes = opened(scan_frame(view.placed, view.map), 2)
+    scan = view.placed.scan
+    laser = view.placed.T_map_base @ scan.T_base_laser
+    silent = points[np.frombuffer(classes, np.uint8) == NO_RETURN]
+    assert len(silent) > 0
+    reach = np.hypot(silent[:, 0] - laser.x, silent[:, 1] - laser.y)
+    np.testing.assert_allclose(reach, scan.range_max, atol=1e-3)
+
+
+def test_nothing_is_a_header_alone():
+    assert scan_frame(None, None) == struct.pack("<BBHId", 1, 1, 0, 0, 0.0)
+    assert particles_frame(None, None, 3.5) == struct.pack("<BBHId", 2, 1, 0, 0, 3.5)
+
+
+def test_particles_go_with_the_robot():
+    poses = np.array([[1.0, 2.0, 0.0], [1.0, 2.0, np.pi / 2]])
+    belief = PlacedParticles(equal_weights(poses), SE2(1.0, 2.0, 0.0))
+    header, values, rest = opened(particles_frame(belief, SE2(1.0, 2.0, 0.0), 7.0), 3)
+    assert (header, rest) == ((2, 1, 0, 2, 7.0), b"")
+    np.testing.assert_allclose(values, poses, atol=1e-6)
+    _, values, _ = opened(particles_frame(belief, SE2(1.5, 2.0, 0.1), 7.1), 3)
+    # Half a metre ahead, each in its own direction.
+    moved = [[1.5, 2.0, 0.1], [1.0, 2.5, np.pi / 2 + 0.1]]
+    np.testing.assert_allclose(values, moved, atol=1e-6)
+
+
+def test_the_words_are_json_without_nan(view):
+    state = state_object(view, 3)
+    assert state["viewers"] == 3
+    assert state["covariance"] == pytest.approx(
+        [float(view.covariance[i]) for i in ((0, 0), (0, 1), (1, 1), (2, 2))]
+    )
+    assert as_text({"a": float("nan"), "b": [float("inf"), 1.5]}) == '{"a":null,"b":[null,1.5]}'
+    assert as_text({"a": "Gebäude\udcff"}).isascii()
+
+
+def test_hello_says_who_may_do_what(view):
+    hello = hello_object("sim", ("goal",), view.map, [], may_steer=False)
+    assert hello["map"] == map_object(view.map)
+    assert (hello["may_steer"], hello["abilities"]) == (False, ["goal"])
+    assert hello_object("dds", (), None, [], may_steer=True)["map"] is None

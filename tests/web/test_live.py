@@ -1,0 +1,415 @@
+"""One WebSocket for each viewer: all see the same, nobody waits for the slow."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import struct
+import time
+from contextlib import ExitStack
+from dataclasses import replace
+from functools import partial
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from live_lab import Drive, Site, drive, fed, simulated, until
+from websockets.asyncio.client import connect as connect_async
+from websockets.exceptions import ConnectionClosed, ConnectionClosedError, InvalidStatus
+from websockets.sync.client import ClientConnection
+from websockets.sync.client import connect as connect_sync
+
+from firstfix.lab.worlds.catalog import WORLDS
+from firstfix.localizer.inputs import NewMap, PoseHint, Reset
+from firstfix.web.guard import Access
+from firstfix.web.hub import MOST_VIEWERS, Hub, Viewer
+from firstfix.web.timeline import MOST_EVENTS
+
+ASLEEP = 20
+PATIENCE_S = 30.0
+
+# A client that stops reading when it has enough does not hear that its good-bye was heard.
+connect = partial(connect_sync, max_queue=None, close_timeout=2.0)
+
+
+@pytest.fixture(scope="module")
+def office() -> Drive:
+    begun = drive("office")
+    begun.step(ASLEEP + 1)
+    return begun
+
+
+@pytest.fixture
+def site(office: Drive):
+    with fed(feed=office.feed) as site:
+        yield site
+
+
+def kind_of(message: str | bytes) -> str:
+    if isinstance(message, bytes):
+        return {1: "scan", 2: "particles"}[message[0]]
+    return json.loads(message)["type"]
+
+
+def stamp_of(message: str | bytes) -> float:
+    if isinstance(message, bytes):
+        return struct.unpack_from("<d", message, 8)[0]
+    return json.loads(message)["stamp"]
+
+
+def next_of(viewer: ClientConnection, kind: str) -> dict:
+    """Wait for the next message of a kind."""
+    while True:
+        message = viewer.recv(PATIENCE_S)
+        if kind_of(message) == kind:
+            return json.loads(message) if isinstance(message, str) else {"frame": message}
+
+
+def test_a_viewer_is_greeted_and_sees_all_that_there_is(site: Site):
+    with connect(site.live) as viewer:
+        first = [viewer.recv(PATIENCE_S) for _ in range(4)]
+        assert [kind_of(message) for message in first] == ["hello", "state", "scan", "particles"]
+        hello, state = json.loads(first[0]), json.loads(first[1])
+        assert (hello["robot"], hello["may_steer"], hello["abilities"]) == ("ros2", True, [])
+        assert hello["map"]["name"] == "office"
+        assert [event["kind"] for event in hello["events"]] == ["map", "found"]
+        assert (state["state"], state["viewers"]) == ("LOCALIZED", 1)
+
+
+def test_what_happens_is_seen_by_all_at_once(site: Site, office: Drive):
+    with connect(site.live) as one, connect(site.live) as other:
+        until(lambda: next_of(one, "state")["viewers"] == 2)
+        office.step(25)
+        last = office.feed.view
+        for viewer in (one, other):
+            until(lambda viewer=viewer: next_of(viewer, "state")["stamp"] == last.stamp)
+    with connect(site.live) as again:
+        assert next_of(again, "state")["viewers"] == 1
+
+
+def test_events_reach_everybody_in_their_order(site: Site, office: Drive):
+    with connect(site.live) as viewer:
+        number = next_of(viewer, "hello")["events"][-1]["number"]
+        for i in range(5):
+            office.feed.tell("person", f"word {i}")
+        heard = [next_of(viewer, "event") for _ in range(5)]
+        assert [event["text"] for event in heard] == [f"word {i}" for i in range(5)]
+        assert [event["number"] for event in heard] == [*range(number + 1, number + 6)]
+
+
+def test_a_new_map_greets_everybody_again(office: Drive):
+    fresh = drive("office")
+    with fed(feed=fresh.feed) as site, connect(site.live) as viewer:
+        old = next_of(viewer, "hello")["map"]
+        fresh.give(NewMap(1.0, WORLDS["house"]()))
+        new = next_of(viewer, "hello")["map"]
+        assert (new["width"], new["image"]["url"]) != (old["width"], old["image"]["url"])
+        assert next_of(viewer, "state")["state"] == "SEARCHING"
+
+
+def test_the_first_frames_before_there_is_a_map():
+    with fed() as site, connect(site.live) as viewer:
+        assert next_of(viewer, "hello")["map"] is None
+        assert next_of(viewer, "state")["state"] == "NO_MAP"
+        assert len(next_of(viewer, "scan")["frame"]) == 16
+
+
+def test_orders_reach_the_localizer(site: Site, office: Drive):
+    with connect(site.live) as viewer:
+        viewer.send('{"type": "token", "token": "not needed"}')
+        viewer.send('{"type": "pose", "x": 1.5, "y": 2.5, "yaw": 0.5}')
+        viewer.send('{"type": "relocalize"}')
+        until(lambda: len(site.given) == 2)
+    hint, reset = site.given
+    assert isinstance(hint, PoseHint)
+    assert (hint.T_map_base.x, hint.T_map_base.y, hint.T_map_base.yaw) == (1.5, 2.5, 0.5)
+    assert isinstance(reset, Reset)
+    assert hint.stamp == reset.stamp == office.feed.view.stamp
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        ("nonsense", "JSON"),
+        ("[1, 2]", "object whose type"),
+        ('{"type": "fly"}', "type is one of pose"),
+        ('{"type": "pose", "x": 1e999, "y": 0, "yaw": 0}', "x as a number"),
+        ('{"type": "pick", "index": 3}', "hypotheses"),
+        ('{"type": "goal", "x": 1, "y": 2}', "simulated robot"),
+        (b"\x00\x01", "JSON"),
+    ],
+)
+def test_what_cannot_be_done_is_told_to_who_asked(site: Site, order: str | bytes, words: str):
+    with connect(site.live) as viewer, connect(site.live) as other:
+        viewer.send(order)
+        assert words in next_of(viewer, "error")["detail"]
+        site.feed.tell("person", "and on it goes")
+        while kind_of(message := other.recv(PATIENCE_S)) != "event":
+            assert kind_of(message) != "error"
+    assert site.given == []
+
+
+def test_who_may_only_watch_is_told_so(office: Drive):
+    with fed(Access(may_steer=False), office.feed) as site, connect(site.live) as viewer:
+        assert next_of(viewer, "hello")["may_steer"] is False
+        viewer.send('{"type": "relocalize"}')
+        assert "--read-only" in next_of(viewer, "error")["detail"]
+        assert site.given == []
+
+
+def test_too_many_messages_are_passed_over(site: Site):
+    with connect(site.live) as viewer:
+        for _ in range(300):
+            viewer.send('{"type": "relocalize"}')
+        until(lambda: "too many" in next_of(viewer, "error")["detail"])
+        assert 60 <= len(site.given) < 290
+
+
+def test_a_message_that_is_too_long_ends_the_connection(site: Site):
+    with connect(site.live) as viewer:
+        viewer.send("x" * 20_000)
+        with pytest.raises(ConnectionClosed) as ended:
+            until(lambda: viewer.recv(PATIENCE_S) is None)
+        assert ended.value.rcvd.code == 1009
+
+
+@pytest.mark.slow
+def test_there_is_an_end_to_viewers(site: Site):
+    with ExitStack() as stack:
+        for _ in range(MOST_VIEWERS):
+            stack.enter_context(connect(site.live)).recv(PATIENCE_S)
+        with connect(site.live) as late, pytest.raises(ConnectionClosed) as ended:
+            late.recv(PATIENCE_S)
+        assert ended.value.rcvd.code == 1013
+    with connect(site.live) as again:
+        assert next_of(again, "hello")
+
+
+TOKEN = "open-sesame"  # noqa: S105 - of a test
+
+
+def test_the_right_token_opens(office: Drive):
+    with fed(Access(TOKEN), office.feed) as site, connect(site.live) as viewer:
+        viewer.send(json.dumps({"type": "token", "token": TOKEN}))
+        assert kind_of(viewer.recv(PATIENCE_S)) == "hello"
+
+
+@pytest.mark.parametrize(
+    "first", ['{"type": "token", "token": "wrong"}', '{"token": 7}', "[]", "", "{", b"\xff"]
+)
+def test_a_wrong_token_closes_and_nothing_is_seen(office: Drive, first: str | bytes):
+    with fed(Access(TOKEN), office.feed) as site, connect(site.live) as viewer:
+        viewer.send(first)
+        with pytest.raises(ConnectionClosed) as ended:
+            viewer.recv(PATIENCE_S)
+        assert ended.value.rcvd.code == 4401
+
+
+def test_who_guesses_here_is_kept_waiting_too(office: Drive):
+    with fed(Access(TOKEN), office.feed) as site:
+
+        def guess(word: str) -> None:
+            with connect(site.live) as viewer:
+                viewer.send(json.dumps({"type": "token", "token": word}))
+                viewer.recv(PATIENCE_S)
+
+        refusals = []
+        for i in range(15):
+            with pytest.raises((ConnectionClosed, InvalidStatus)) as refusal:
+                guess(f"{i}")
+            refusals.append(refusal.type)
+        assert refusals[0] is ConnectionClosedError
+        assert InvalidStatus in refusals
+
+
+def test_without_a_token_nothing_is_seen(office: Drive, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("firstfix.web.live._TOKEN_S", 0.1)
+    with fed(Access(TOKEN), office.feed) as site, connect(site.live) as viewer:
+        with pytest.raises(ConnectionClosed) as ended:
+            viewer.recv(PATIENCE_S)
+        assert ended.value.rcvd.code == 4401
+
+
+def reached(site: Site) -> socket.socket:
+    return socket.create_connection(("127.0.0.1", urlsplit(site.url).port))
+
+
+@pytest.mark.slow
+def test_a_viewer_that_does_not_read_keeps_nobody_waiting():
+    """Frames for it are dropped; what it gets when it reads again is new."""
+    office = drive("office")
+    office.step(ASLEEP + 1)
+    view = office.feed.view
+    with fed(feed=office.feed) as site, reached(site) as deaf:
+        deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 32 * 1024)
+        deaf.sendall(
+            b"GET /v1/live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\n"
+            b"Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+            b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+        )
+        with connect(site.live) as viewer:
+            until(lambda: next_of(viewer, "state")["viewers"] == 2)
+            for i in range(30):  # 30 kB each: far more than the buffers between them hold
+                office.feed._view = replace(view, stamp=1000.0 + i, placed=replace(view.placed))
+                office.feed.tell("person", f"{i}")
+                until(lambda i=i: next_of(viewer, "state")["stamp"] == 1000.0 + i)
+        deaf.settimeout(PATIENCE_S)
+        received = 0
+        tail = b""
+        while b'"stamp":1029.0,"state"' not in tail:
+            part = deaf.recv(65536)
+            received += len(part)
+            tail = tail[-100:] + part
+        assert received < 20 * 30_000
+
+
+def test_what_waits_for_a_viewer_is_bounded():
+    async def story() -> list:
+        viewer = Viewer()
+        for i in range(10_000):
+            viewer.show("state", f"state {i}")
+            viewer.show("scan", b"scan %d" % i)
+            viewer.tell(f"event {i}")
+            viewer.show("hello", f"hello {i}")
+        return await viewer.next()
+
+    frames = asyncio.run(story())
+    assert frames[0] == "hello 9999"
+    assert frames[1:-2] == [f"event {i}" for i in range(10_000 - MOST_EVENTS, 10_000)]
+    assert frames[-2:] == ["state 9999", b"scan 9999"]
+
+
+def test_twenty_viewers_see_the_same(site: Site, office: Drive):
+    async def watch(until_stamp: float) -> list[bytes]:
+        seen = []
+        async with connect_async(site.live, max_queue=None, close_timeout=2.0) as viewer:
+            async for message in viewer:
+                if kind_of(message) == "scan":
+                    seen.append(message)
+                if kind_of(message) == "state" and stamp_of(message) >= until_stamp:
+                    return seen
+        return seen
+
+    async def all_of_them(last: float) -> list[list[bytes]]:
+        watching = [asyncio.create_task(watch(last)) for _ in range(20)]
+        while not all(task.done() for task in watching):
+            if office.feed.view.stamp < last:
+                await asyncio.to_thread(office.step)
+            await asyncio.sleep(0.02)
+        return [task.result() for task in watching]
+
+    last = office.feed.view.stamp + 3.0
+    seen = asyncio.run(asyncio.wait_for(all_of_them(last), 60.0))
+    assert len(seen) == 20
+    common = set(seen[0]).intersection(*seen[1:])
+    assert len(common) >= 5
+    assert all(len(frames) <= 40 for frames in seen)
+
+
+def test_frames_are_made_once_for_all_and_not_at_all_for_nobody(monkeypatch: pytest.MonkeyPatch):
+    made = []
+    monkeypatch.setattr("firstfix.web.hub.scan_frame", lambda *_: made.append(1) or b"\x01" * 16)
+    begun = drive("house")
+    hub = Hub(begun.feed, lambda: "hello", lambda: None)
+
+    async def story() -> None:
+        running = asyncio.create_task(hub.run())
+        await asyncio.sleep(0.01)
+        begun.step(ASLEEP + 5)
+        await asyncio.sleep(0.2)
+        assert made == []
+        viewers = [hub.join() for _ in range(5)]
+        made.clear()
+        begun.step()
+        await asyncio.sleep(0.2)
+        assert len(made) == 1
+        for viewer in viewers:
+            assert b"\x01" * 16 in await viewer.next()
+        running.cancel()
+
+    asyncio.run(story())
+
+
+def test_an_error_of_ours_does_not_end_the_show(caplog: pytest.LogCaptureFixture):
+    begun = drive("house")
+    hub = Hub(begun.feed, lambda: "hello", lambda: None)
+
+    async def story() -> None:
+        running = asyncio.create_task(hub.run())
+        viewer = hub.join()
+        await viewer.next()
+        right, begun.feed._view = begun.feed._view, replace(begun.feed.view, evidence=object())
+        begun.feed.tell("person", "something odd")
+        await asyncio.sleep(0.1)
+        begun.feed._view = right
+        begun.feed.tell("person", "all well")
+        await asyncio.sleep(0.2)
+        assert any("all well" in text for text in await viewer.next())
+        running.cancel()
+
+    asyncio.run(story())
+    assert "could not be shown" in caplog.text
+
+
+def test_the_first_viewer_is_greeted_once():
+    greeted = []
+    begun = drive("house")
+
+    async def story() -> None:
+        hub = Hub(begun.feed, lambda: "hello", lambda: greeted.append(1))
+        hub.leave(hub.join())
+        hub.leave(hub.join())
+
+    asyncio.run(story())
+    assert greeted == [1]
+
+
+def test_the_end_of_the_server_is_told_and_another_one_goes_on(office: Drive):
+    with ExitStack() as server:
+        site = server.enter_context(fed(feed=office.feed))
+        with connect(site.live) as viewer:
+            assert next_of(viewer, "hello")
+            server.close()
+            with pytest.raises(ConnectionClosed) as ended:
+                until(lambda: viewer.recv(PATIENCE_S) is None)
+            assert ended.value.rcvd.code == 1012
+    with fed(feed=office.feed) as site, connect(site.live) as viewer:
+        assert next_of(viewer, "hello")["events"]
+
+
+def test_a_story_with_a_simulated_robot():
+    """Found, helped, carried away and found again, steered by two viewers."""
+    grid = WORLDS["house"]()
+    with simulated(grid) as site, connect(site.live) as one, connect(site.live) as other:
+        hello = next_of(one, "hello")
+        assert (hello["robot"], set(hello["abilities"])) == (
+            "sim",
+            {"goal", "carry", "people", "pause"},
+        )
+        until(lambda: next_of(one, "state")["state"] == "LOCALIZED")
+        state = until(lambda: (s := next_of(one, "state"))["pose"] and s)
+        assert np.hypot(*np.subtract(state["pose"], state["truth"])[:2]) < 0.3
+
+        other.send('{"type": "pause", "paused": true}')
+        until(lambda: next_of(one, "state")["paused"])
+        stamp = site.feed.view.stamp
+        time.sleep(0.3)
+        assert site.feed.view.stamp <= stamp + 0.1
+        other.send('{"type": "pause", "paused": false}')
+        until(lambda: not next_of(one, "state")["paused"])
+
+        other.send('{"type": "people", "count": 3}')
+        until(lambda: "3 people" in next_of(one, "event")["text"])
+        other.send('{"type": "people", "count": 0}')
+        x, y, yaw = state["truth"]
+        one.send(json.dumps({"type": "carry", "x": x, "y": y, "yaw": yaw + 1.5}))
+        until(lambda: next_of(other, "state")["state"] == "SEARCHING")
+        until(lambda: next_of(other, "state")["state"] == "LOCALIZED")
+
+        def refused() -> str:
+            one.send(json.dumps({"type": "goal", "x": -99, "y": y}))
+            return next_of(one, "error")["detail"]
+
+        # Found by the first scan after it stands, perhaps before the hands are off.
+        until(lambda: "free space" in refused())

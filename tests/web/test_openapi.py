@@ -1,0 +1,75 @@
+"""The document of the API is valid, and the server does what it says."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+
+import pytest
+from live_lab import drive, fed
+
+from firstfix.web.api import Api
+from firstfix.web.hub import Hub
+from firstfix.web.openapi import document
+
+REFS = "#/components/schemas/"
+
+
+def references(node: object) -> set[str]:
+    """Return all that a document refers to."""
+    if isinstance(node, dict):
+        own = {node["$ref"]} if "$ref" in node else set()
+        return own.union(*(references(value) for value in node.values()))
+    if isinstance(node, list):
+        return set().union(*(references(value) for value in node))
+    return set()
+
+
+def test_what_is_referred_to_is_there_and_the_other_way_round():
+    described = document()
+    schemas = {REFS + name for name in described["components"]["schemas"]}
+    assert references(described) == schemas
+
+
+def test_every_route_is_described_with_its_method():
+    begun = drive("house")
+    hub = Hub(begun.feed, str, lambda: None)
+    routes = Api(None, hub).routes()
+    served = {(route.path, method) for route in routes for method in route.methods - {"HEAD"}}
+    described = {
+        (path, method.upper())
+        for path, methods in document()["paths"].items()
+        for method in methods
+    }
+    assert described == served
+
+
+def test_every_refusal_is_a_problem():
+    for path, methods in document()["paths"].items():
+        for method, operation in methods.items():
+            for status, answer in operation["responses"].items():
+                if int(status) >= 400:
+                    assert [*answer["content"]] == ["application/problem+json"], (path, method)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    importlib.util.find_spec("schemathesis") is None, reason="schemathesis is not installed"
+)
+def test_a_stranger_who_has_only_read_the_document_finds_no_fault():
+    begun = drive("house")
+    begun.step(25)
+    arguments = (
+        *("--seed", "1", "--max-examples", "10", "--generation-deterministic"),
+        *("--rate-limit", "30/s", "--workers", "1", "--no-color"),
+        # Any bytes may be an .npz, as far as a schema can say.
+        *("--exclude-checks", "positive_data_acceptance"),
+    )
+    with fed(feed=begun.feed) as site:
+        command = [sys.executable, "-m", "schemathesis.cli", "run", site.url + "openapi.json"]
+        ended = subprocess.run(
+            [*command, *arguments], capture_output=True, text=True, timeout=240, check=False
+        )
+    assert ended.returncode == 0, ended.stdout[-4000:] + ended.stderr[-2000:]
+    assert "Tested: 6" in ended.stdout

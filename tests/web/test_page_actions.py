@@ -1,0 +1,253 @@
+"""What people do on the page arrives at the robot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from page_lab import DESKTOP, PHONE, Server, Visit, wait_until
+
+from firstfix.core.angles import angle_error
+from firstfix.lab.worlds.catalog import WORLDS, random_free_poses
+
+pytestmark = pytest.mark.slow
+
+Visitor = Callable[..., Visit]
+
+
+@pytest.fixture
+def page(visit: Visitor, office_server: Server) -> Visit:
+    """Give the page of a robot that knows where it is."""
+    visited = visit(office_server.url)
+    visited.wait_for_fix()
+    return visited
+
+
+def said_at(page: Visit) -> tuple[float, float]:
+    """Return where the newest hint says that the robot is."""
+    match = page.wait_for_event(r"says.* \((-?[\d.]+), (-?[\d.]+)\)")
+    return float(match[1]), float(match[2])
+
+
+def stand_still(page: Visit) -> None:
+    """Hold the robot, and look at it from near by."""
+    page.page.keyboard.press("l")
+    page.page.keyboard.press(" ")
+    page.page.wait_for_selector("#paused", state="visible")
+    page.wait_for_rest()
+
+
+def error_of(page: Visit) -> tuple[float, float]:
+    """Return how far the pose is from the truth, m and rad; far where there is none."""
+    pose, truth = page.pose(), page.pose("truth")
+    if not pose or not truth:
+        return math.inf, math.inf
+    return math.dist(pose[:2], truth[:2]), float(angle_error(pose[2], truth[2]))
+
+
+def test_a_drag_sets_the_pose(page: Visit) -> None:
+    stand_still(page)
+    x, y, yaw = page.pose("truth")
+    page.page.click("#mode-pose")
+    assert page.page.get_attribute("#mode-pose", "aria-pressed") == "true"
+    page.press_and_pull(x, y, yaw)
+    assert math.dist(said_at(page), (x, y)) < 0.05
+    assert page.data("mode") == "look"
+    page.page.keyboard.press(" ")
+    page.wait_for_event("a person said where")
+    page.wait_for_state("LOCALIZED")
+    assert error_of(page) < (0.2, 0.2)
+
+
+def test_a_press_without_a_pull_says_nothing(page: Visit) -> None:
+    before = page.events()
+    page.page.click("#mode-pose")
+    page.click_on_map(20.0, 12.0)
+    page.page.wait_for_selector("#complaint", state="visible")
+    assert "pull" in page.page.inner_text("#complaint")
+    assert not [text for text in page.events() if "says" in text and text not in before]
+
+
+def test_a_long_press_of_a_finger_sets_the_pose(visit: Visitor, office_server: Server) -> None:
+    page = visit(office_server.url, PHONE)
+    page.wait_for_fix()
+    page.page.tap("#follow")
+    page.page.tap("#pause")
+    page.page.wait_for_selector("#paused", state="visible")
+    page.wait_for_rest()
+    x, y, yaw = page.pose("truth")
+    px, py = page.pixel(x, y)
+    hand = Fingers(page)
+    hand.touch("touchStart", [(px, py)])
+    wait_until(lambda: page.data("mode") == "pose", lambda: "a long press")
+    for reach in (20.0, 50.0):
+        hand.touch("touchMove", [(px + reach * math.cos(yaw), py - reach * math.sin(yaw))])
+    hand.touch("touchEnd", [])
+    assert math.dist(said_at(page), (x, y)) < 0.05
+    page.page.wait_for_timeout(700)  # sooner, the browser takes both for a double tap
+    page.page.tap("#pause")
+    page.wait_for_event("a person said where")
+    page.wait_for_state("LOCALIZED")
+
+
+class Fingers:
+    """Touches of a screen."""
+
+    def __init__(self, page: Visit) -> None:
+        self._session = page.page.context.new_cdp_session(page.page)
+
+    def touch(self, kind: str, at: list[tuple[float, float]]) -> None:
+        points = [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(at)]
+        self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+
+def test_two_fingers_zoom_and_one_pans(visit: Visitor, office_server: Server) -> None:
+    page = visit(office_server.url, PHONE)
+    page.wait_for_map()
+    scale, *_ = (float(value) for value in page.data("view").split())
+    hand = Fingers(page)
+    hand.touch("touchStart", [(150.0, 250.0), (210.0, 250.0)])
+    for wide in (40.0, 60.0, 90.0):
+        hand.touch("touchMove", [(180.0 - wide, 250.0), (180.0 + wide, 250.0)])
+    hand.touch("touchEnd", [])
+    wait_until(
+        lambda: float(page.data("view").split()[0]) == pytest.approx(3.0 * scale, rel=0.05),
+        lambda: f"{scale} -> {page.data('view')}",
+    )
+    before = page.pixel(20.0, 12.0)
+    hand.touch("touchStart", [(180.0, 300.0)])
+    for along in (10.0, 20.0, 40.0):
+        hand.touch("touchMove", [(180.0 + along, 300.0)])
+    hand.touch("touchEnd", [])
+    wait_until(
+        lambda: page.pixel(20.0, 12.0)[0] - before[0] == pytest.approx(40.0, abs=1.0),
+        lambda: f"{before} -> {page.pixel(20.0, 12.0)}",
+    )
+    assert page.data("mode") == "look"
+
+
+def test_the_wheel_zooms_where_it_points(page: Visit) -> None:
+    before = page.pixel(5.0, 5.0)
+    scale = page.scale
+    page.page.mouse.move(*before)
+    page.page.mouse.wheel(0, -500)
+    wait_until(lambda: page.scale > 1.5 * scale, lambda: f"{scale} -> {page.scale}")
+    assert page.pixel(5.0, 5.0) == pytest.approx(before, abs=1.5)  # whole pixels, zoomed
+
+
+@pytest.mark.parametrize("way", ["ghost", "list"])
+def test_picking_a_place_resolves_an_ambiguous_start(
+    visit: Visitor, rooms_server: Server, way: str
+) -> None:
+    page = visit(rooms_server.url)
+    page.wait_for_map()
+    page.page.keyboard.press("r")
+    page.wait_for_state("AMBIGUOUS")
+    page.page.keyboard.press(" ")
+    page.page.wait_for_selector("#paused", state="visible")
+    places = rooms_server.status()["hypotheses"]
+    truth = page.pose("truth")
+    assert len([place for place in places if place["probability"] > 0.1]) == 4
+    index = min(range(len(places)), key=lambda i: math.dist(places[i]["pose"][:2], truth[:2]))
+    if way == "ghost":
+        page.click_on_map(*places[index]["pose"][:2])
+    else:
+        button = page.page.matcher(".place").nth(index)
+        button.focus()
+        page.page.keyboard.press("Enter")
+    page.page.click("#pause")
+    page.wait_for_state("LOCALIZED")
+    wait_until(lambda: error_of(page) < (0.2, 0.2), lambda: f"{page.pose()}, not {truth}")
+    assert page.page.matcher(".place").count() == 0
+
+
+def test_a_carried_robot_is_searched_and_found(page: Visit) -> None:
+    x, y, yaw = 4.0, 19.5, -0.8
+    page.page.click("#mode-carry")
+    page.press_and_pull(x, y, yaw)
+    page.wait_for_state("SEARCHING")
+    assert page.page.inner_text("#state-word") == "SEARCHING"
+    page.wait_for_state("LOCALIZED")
+    wait_until(lambda: error_of(page) < (0.3, 0.2), lambda: f"{page.pose()}")
+    match = page.wait_for_event(r"carried to \((-?[\d.]+), (-?[\d.]+)\)")
+    assert math.dist((float(match[1]), float(match[2])), (x, y)) < 0.06  # a pixel at this scale
+    page.wait_for_event("found at")
+
+
+def test_a_goal_is_driven_to(page: Visit) -> None:
+    here = page.pose("truth")
+    places = random_free_poses(WORLDS["office"](), np.random.default_rng(0), 400, 0.5)
+    near = (place for place in places if 1.0 < math.dist((place.x, place.y), here[:2]) < 3.0)
+    goal = min(near, key=lambda place: math.dist((place.x, place.y), here[:2]))
+    page.page.click("#mode-goal")
+    page.click_on_map(goal.x, goal.y)
+    page.wait_for_event("sent to")
+    wait_until(
+        lambda: math.dist(page.pose("truth")[:2], (goal.x, goal.y)) < 0.3,
+        lambda: f"at {page.pose('truth')}, not {goal}",
+        90.0,
+    )
+    assert page.data("mode") == "goal"  # the next click is the next goal
+    page.page.keyboard.press("Escape")
+    assert page.data("mode") == "look"
+
+
+def test_what_cannot_be_done_is_said(page: Visit) -> None:
+    page.page.click("#mode-goal")
+    page.click_on_map(35.0, 1.0)  # outside of the building
+    page.page.wait_for_selector("#complaint", state="visible")
+    assert page.page.inner_text("#complaint")
+
+
+def test_relocalize_forgets_and_searches(page: Visit) -> None:
+    page.page.click("#relocalize")
+    page.wait_for_event("search anew")
+    page.wait_for_state("LOCALIZED")
+
+
+def test_pause_holds_the_robot(page: Visit, office_server: Server) -> None:
+    page.page.click("#pause")
+    page.page.wait_for_selector("#paused", state="visible")
+    assert page.page.inner_text("#pause-text") == "Go on"
+    stamp = wait_until(
+        lambda: held_stamp(page, office_server), lambda: f"{office_server.status()['stamp']} stays"
+    )
+    page.page.click("#pause")
+    wait_until(lambda: office_server.status()["stamp"] > stamp, lambda: "the clock goes on")
+
+
+def held_stamp(page: Visit, server: Server) -> float | None:
+    """Return the time of the robot if its clock stands still."""
+    before = server.status()["stamp"]
+    page.page.wait_for_timeout(300)
+    return before if server.status()["stamp"] == before else None
+
+
+def test_people_come_and_go(page: Visit) -> None:
+    slider = page.page.matcher("#people")
+    slider.fill("12")
+    assert page.page.inner_text("#people-count") == "12"
+    short = page.page.matcher("#legend .short b")
+    wait_until(lambda: short.inner_text() not in {"0%", "–"}, lambda: "somebody is seen")
+    page.page.click("#add-person")
+    assert page.page.inner_text("#people-count") == "13"
+    slider.fill("0")
+    wait_until(lambda: short.inner_text() == "0%", lambda: f"{short.inner_text()} after all left")
+
+
+@pytest.mark.parametrize("device", [DESKTOP, PHONE], ids=["desktop", "phone"])
+def test_what_is_shown_can_be_chosen(visit: Visitor, office_server: Server, device: dict) -> None:
+    page = visit(office_server.url, device)
+    page.wait_for_fix()
+    if device is PHONE:
+        page.page.tap("#sheet-handle")
+    for chip in page.page.matcher(".chip").all():
+        chip.click()
+        assert chip.get_attribute("aria-pressed") == "false"
+    page.page.wait_for_timeout(200)
+    # Nothing but the robot, its heading, and the canvas itself.
+    x, y, yaw = page.pose()
+    behind = page.colour("overlay", x - 3.0 * math.cos(yaw), y - 3.0 * math.sin(yaw))
+    assert behind == (0, 0, 0, 0)
