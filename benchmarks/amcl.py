@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.amcl.beam_selection import Beams, choose_beams
+from firstfix.amcl.beam_selection import SelectedBeams, select_beams
 from firstfix.amcl.clusters import find_clusters
 from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.filter import start, step
@@ -73,12 +73,12 @@ def time_update(
     sensor = LikelihoodField(grid, config)
     state = start(around_pose(pose, SPREAD, n, rng))
     belief = state.particles
-    beams = choose_beams(scan, config)
+    beams = select_beams(scan, config)
     print(f"\n{n} particles x {max_beams} beams, {len(beams.hits)} of them hit; {runs} runs")
     show("whole update", runs, lambda: step(state, INCREMENT, scan, sensor, rng, config, never))
     print(f"  memory over the process before: {peak_mb() - before:.0f} MB")
     show("propagate", runs, lambda: propagate(belief, INCREMENT, config, rng))
-    show("choose beams", runs, lambda: choose_beams(scan, config))
+    show("choose beams", runs, lambda: select_beams(scan, config))
     kernel = show("likelihood field", runs, lambda: sensor.log_likelihood(belief, beams))
     print(f"  that is {kernel / (n * len(beams.hits)) * 1e6:.2f} ns per particle and beam")
     show("clusters", runs, lambda: find_clusters(belief, belief.weight))
@@ -91,7 +91,9 @@ def time_update(
     print(f"  and agrees for {same:.2%} of the particles (the kernel's end points are float32)")
 
 
-def numpy_twin(particles: Particles, beams: Beams, sensor: LikelihoodField) -> NDArray[np.float64]:
+def numpy_twin(
+    particles: Particles, beams: SelectedBeams, sensor: LikelihoodField
+) -> NDArray[np.float64]:
     grid = sensor.grid
     by_square = likelihoods(sensor.limit, grid.resolution, beams.range_max, sensor.config)
     logs = np.log(by_square)[sensor.squares]

@@ -48,9 +48,9 @@ def judged(folder: Path, arguments: argparse.Namespace) -> list[str]:
     for i, elsewhere in zip(chosen.tolist(), wrong, strict=True):
         scan, truth = recording.scans[i], SE2.from_array(recording.truth[i])
         began = time.process_time()
-        costs[0].append(matcher.examine(scan, [truth])[0].score)
+        costs[0].append(matcher.score_poses(scan, [truth])[0].score)
         judging.append(time.process_time() - began)
-        costs[1].append(matcher.examine(scan, [elsewhere])[0].score)
+        costs[1].append(matcher.score_poses(scan, [elsewhere])[0].score)
         began = time.process_time()
         costs[2].append(matcher.search_locally(scan, elsewhere).score)
         searching.append(time.process_time() - began)

@@ -67,7 +67,7 @@ def serve(pipe: Connection) -> None:
             equal_weights(pose.as_array() + 0.1 * rng.standard_normal((PARTICLES, 3)))
             for pose, _ in placed
         ]
-        evidence = localizer.matcher.examine(placed[0][1], [placed[0][0]])[0].evidence
+        evidence = localizer.matcher.score_poses(placed[0][1], [placed[0][0]])[0].evidence
         i = 0
         while not is_over.wait(1.0 / HZ):
             i += 1

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from firstfix.amcl import sensor as sensor_module
 from firstfix.amcl import tracker as track_module
-from firstfix.amcl.beam_selection import Beams
+from firstfix.amcl.beam_selection import SelectedBeams
 from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.likelihood_field import LikelihoodField
 from firstfix.amcl.particles import Particles
@@ -40,11 +40,13 @@ CHI2_3SIGMA = 14.16
 class SumOfCubes(LikelihoodField):
     """AMCL's likelihood_field: one plus the sum of the cubes of the beams' likelihoods."""
 
-    def log_likelihood(self, particles: Particles, beams: Beams) -> tuple[NDArray[np.float64], int]:
+    def log_likelihood(
+        self, particles: Particles, beams: SelectedBeams
+    ) -> tuple[NDArray[np.float64], int]:
         """Judge every particle by a scan, as `LikelihoodField` does."""
         sums = np.ones(len(particles))
         for i in range(len(beams.hits)):
-            one = Beams(
+            one = SelectedBeams(
                 beams.bearings[i : i + 1],
                 np.zeros(1),
                 beams.hits[i : i + 1],

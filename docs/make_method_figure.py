@@ -64,7 +64,7 @@ def _explained(matcher: ff.ScanMatcher, grid: ff.OccupancyGrid, scan: ff.LaserSc
     stride = round(STEP_M / grid.resolution)
     rows, columns = np.nonzero(grid.seen_free[::stride, ::stride])
     points = grid.to_map(stride * np.column_stack([columns, rows]) + 0.5)
-    looks = matcher.examine(scan, [ff.SE2(x, y, TRUTH.yaw) for x, y in points.tolist()])
+    looks = matcher.score_poses(scan, [ff.SE2(x, y, TRUTH.yaw) for x, y in points.tolist()])
     return points, np.array([look.evidence.explained for look in looks])
 
 

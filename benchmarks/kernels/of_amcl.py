@@ -9,7 +9,7 @@ from kernel import Kernel
 from of_fields import LEAP_OPERATIONS, leap_roofs
 
 from firstfix.amcl import bins, clusters, kld, likelihood_field, motion, ray_model, resampling
-from firstfix.amcl.beam_selection import Beams, choose_beams
+from firstfix.amcl.beam_selection import SelectedBeams, select_beams
 from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.initial import around_pose
 from firstfix.amcl.particles import Particles
@@ -31,7 +31,7 @@ def kernels(
     config = AmclConfig(min_particles=100, max_particles=PARTICLES)
     belief = around_pose(pose, SPREAD, PARTICLES, rng)
     belief = belief.reweighed(rng.random(PARTICLES))
-    beams = choose_beams(scan, config)
+    beams = select_beams(scan, config)
     return [
         *_looked_up(grid, belief, beams, config),
         _cast(grid, belief, beams, config),
@@ -43,7 +43,7 @@ def kernels(
 
 
 def _looked_up(
-    grid: OccupancyGrid, belief: Particles, beams: Beams, config: AmclConfig
+    grid: OccupancyGrid, belief: Particles, beams: SelectedBeams, config: AmclConfig
 ) -> list[Kernel]:
     sensor = likelihood_field.LikelihoodField(grid, config)
     poses = likelihood_field._in_cells(belief, grid)
@@ -87,7 +87,9 @@ def _looked_up(
     ]
 
 
-def _cast(grid: OccupancyGrid, belief: Particles, beams: Beams, config: AmclConfig) -> Kernel:
+def _cast(
+    grid: OccupancyGrid, belief: Particles, beams: SelectedBeams, config: AmclConfig
+) -> Kernel:
     some = Particles(*(v[:500].copy() for v in (belief.x, belief.y, belief.yaw, belief.weight)))
     model = ray_model.RayModel(grid, config)
     cells = grid.to_cells(np.column_stack([some.x, some.y]))

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from firstfix.amcl import likelihood_field
-from firstfix.amcl.beam_selection import Beams, choose_beams
+from firstfix.amcl.beam_selection import SelectedBeams, select_beams
 from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.amcl.likelihood_field import LikelihoodField, likelihoods
 from firstfix.amcl.particles import Particles, equal_weights
@@ -59,11 +59,13 @@ def somewhere(grid: OccupancyGrid, n: int, seed: int = 0, beyond: float = 0.0) -
     return equal_weights(np.column_stack([grid.to_map(cells), rng.uniform(-4.0, 4.0, n)]))
 
 
-def end_cells(pose: NDArray[np.float64], beams: Beams, grid: OccupancyGrid) -> NDArray[np.float64]:
+def end_cells(
+    pose: NDArray[np.float64], beams: SelectedBeams, grid: OccupancyGrid
+) -> NDArray[np.float64]:
     return grid.to_cells(SE2.from_array(pose).apply(beams.hits))
 
 
-def settled(particles: Particles, beams: Beams, grid: OccupancyGrid) -> Particles:
+def settled(particles: Particles, beams: SelectedBeams, grid: OccupancyGrid) -> Particles:
     """Keep the particles none of whose beams ends near the side of a cell."""
     poses = particles.poses()
     ends = np.array([end_cells(pose, beams, grid) for pose in poses])
@@ -104,7 +106,7 @@ def kept_beams(distances: NDArray[np.float64], config: AmclConfig) -> NDArray[np
 
 
 def brute_force(
-    particles: Particles, beams: Beams, grid: OccupancyGrid, config: AmclConfig
+    particles: Particles, beams: SelectedBeams, grid: OccupancyGrid, config: AmclConfig
 ) -> tuple[NDArray[np.float64], int]:
     ends = [end_cells(pose, beams, grid) for pose in particles.poses()]
     distances = np.array([[distance_m(e, grid, config) for e in row] for row in ends])
@@ -119,7 +121,7 @@ def brute_force(
 def assert_equal_to_brute_force(
     particles: Particles, scan: LaserScan, grid: OccupancyGrid, config: AmclConfig
 ) -> None:
-    beams = choose_beams(scan, config)
+    beams = select_beams(scan, config)
     particles = settled(particles, beams, grid)
     logs, used = LikelihoodField(grid, config).log_likelihood(particles, beams)
     expected, expected_used = brute_force(particles, beams, grid, config)
@@ -163,7 +165,7 @@ def test_far_from_the_border_logs_are_those_of_brute_force():
 
 def test_what_else_is_in_the_block_changes_nothing():
     grid, config = big_map(), AmclConfig()
-    field, beams = LikelihoodField(grid, config), choose_beams(scan_of(60, 5), config)
+    field, beams = LikelihoodField(grid, config), select_beams(scan_of(60, 5), config)
     inside = somewhere(grid, 700, 5, beyond=-45.0)
     everywhere = somewhere(grid, 700, 6, beyond=30.0)
     poses = np.concatenate([inside.poses(), everywhere.poses(), [[1e6, -1e6, 0.0]]])
@@ -186,7 +188,7 @@ def test_beams_that_just_reach_the_border_are_looked_up_right(reach, x, y):
     scan = LaserScan(ranges, 0.013, 2 * math.pi / 60, 0.05, 8.0)
     particles = equal_weights(np.array([[x * RESOLUTION, y * RESOLUTION, 0.0]]))
     config = AmclConfig(laser_likelihood_max_dist=0.6)
-    beams = choose_beams(scan, config)
+    beams = select_beams(scan, config)
     logs, _ = LikelihoodField(grid, config).log_likelihood(particles, beams)
     expected, _ = brute_force(particles, beams, grid, config)
     np.testing.assert_allclose(logs, expected, atol=60 * UNIT)
@@ -219,7 +221,7 @@ def skipping(grid: OccupancyGrid, **settings: object) -> tuple[int, int]:
     config = AmclConfig(
         laser_model_type=PROB, beam_skip_distance=0.4, **({"do_beamskip": True} | settings)
     )
-    beams = choose_beams(scan, config)
+    beams = select_beams(scan, config)
     rng = np.random.default_rng(0)
     cloud = equal_weights(pose + rng.normal(0.0, 0.02, (100, 3)))
     return len(beams.hits), LikelihoodField(grid, config).log_likelihood(cloud, beams)[1]
@@ -248,14 +250,14 @@ def test_what_explains_a_beam_is_told_once_not_for_every_scan(monkeypatch):
     grid, config = drawn(), AmclConfig(laser_model_type=PROB, do_beamskip=True)
     field = LikelihoodField(grid, config)
     for seed in (1, 2):
-        field.log_likelihood(somewhere(grid, 50, seed), choose_beams(scan_of(30, seed), config))
+        field.log_likelihood(somewhere(grid, 50, seed), select_beams(scan_of(30, seed), config))
     assert seen[0] is seen[1]
     assert seen[0].size == field.squares.size
     assert not seen[0].flags.writeable
 
 
 def test_beams_are_skipped_by_one_model_only():
-    beams = choose_beams(scan_of(60), AmclConfig())
+    beams = select_beams(scan_of(60), AmclConfig())
     config = AmclConfig(do_beamskip=True, beam_skip_threshold=1.0, beam_skip_error_threshold=1.0)
     _, used = LikelihoodField(drawn(), config).log_likelihood(somewhere(drawn(), 50), beams)
     assert used == len(beams.hits)
@@ -268,7 +270,7 @@ def test_moving_map_and_particles_together_changes_nothing(move, model):
     config = AmclConfig(laser_model_type=model, do_beamskip=True, model_unknown_space=True)
     here = drawn()
     there = OccupancyGrid(here.cells, RESOLUTION, move @ here.T_map_grid)
-    beams = choose_beams(scan_of(40, 9), config)
+    beams = select_beams(scan_of(40, 9), config)
     particles = settled(somewhere(here, 200, 9, beyond=3.0), beams, here)
     poses = particles.poses()
     moved = np.column_stack([move.apply(poses[:, :2]), poses[:, 2] + move.yaw])
@@ -305,7 +307,7 @@ def test_distances_end_where_they_fit_no_longer():
 @pytest.mark.parametrize("wall", [True, False])
 def test_a_map_of_a_single_cell_is_a_map(wall):
     grid = OccupancyGrid(np.array([[OCCUPIED if wall else 0]], np.int8), RESOLUTION)
-    beams = choose_beams(scan_of(30), AmclConfig())
+    beams = select_beams(scan_of(30), AmclConfig())
     particles = settled(equal_weights(np.array([[0.1, 0.1, 0.3], [-5.0, 9.0, 1.0]])), beams, grid)
     logs, _ = LikelihoodField(grid, AmclConfig()).log_likelihood(particles, beams)
     expected, used = brute_force(particles, beams, grid, AmclConfig())
@@ -318,7 +320,7 @@ def test_a_scan_without_hits_says_nothing():
         for model in (SensorModel.LIKELIHOOD_FIELD, PROB):
             config = AmclConfig(laser_model_type=model, do_beamskip=True)
             field = LikelihoodField(drawn(), config)
-            logs, used = field.log_likelihood(somewhere(drawn(), 30), choose_beams(scan, config))
+            logs, used = field.log_likelihood(somewhere(drawn(), 30), select_beams(scan, config))
             assert used == 0
             assert not logs.any()
 
@@ -329,7 +331,7 @@ def test_as_many_beams_as_a_scan_may_have_are_summed_without_overflow():
     scan = LaserScan(np.full(20_000, 5.0, np.float32), 0.0, 1e-4, 0.05, 1e6)
     grid = OccupancyGrid(np.zeros((4, 4), np.int8), RESOLUTION)
     logs, used = LikelihoodField(grid, config).log_likelihood(
-        equal_weights(np.zeros((3, 3))), choose_beams(scan, config)
+        equal_weights(np.zeros((3, 3))), select_beams(scan, config)
     )
     assert used == 20_000
     np.testing.assert_allclose(logs, 20_000 * math.log(1e-9), rtol=1e-5)
@@ -351,7 +353,7 @@ class Contested(LikelihoodField):
 
 def test_sensors_of_other_reach_may_ask_at_the_same_time():
     field, particles = Contested(drawn(), AmclConfig()), somewhere(drawn(), 20)
-    beams = choose_beams(scan_of(40), AmclConfig())
+    beams = select_beams(scan_of(40), AmclConfig())
     expected, _ = LikelihoodField(drawn(), AmclConfig()).log_likelihood(particles, beams)
     logs, _ = field.log_likelihood(particles, beams)
     np.testing.assert_array_equal(logs, expected)

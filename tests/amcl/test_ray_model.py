@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from firstfix.amcl.beam_selection import choose_beams
+from firstfix.amcl.beam_selection import select_beams
 from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.amcl.particles import Particles, equal_weights
 from firstfix.amcl.ray_model import RayModel
@@ -52,7 +52,7 @@ def textbook(measured: float, expected: float, range_max: float, config: AmclCon
 def brute_force(
     particles: Particles, scan: LaserScan, grid: OccupancyGrid, config: AmclConfig
 ) -> tuple[NDArray[np.float64], int]:
-    """Look at the scan itself: this twin shares no line with `choose_beams`, either."""
+    """Look at the scan itself: this twin shares no line with `select_beams`, either."""
     reach = min(scan.range_max, config.laser_max_range)
     valid = scan.hit | scan.no_return
     logs = np.zeros(len(particles))
@@ -68,7 +68,7 @@ def brute_force(
 @pytest.mark.parametrize("place", [SE2.identity(), PLACE], ids=str)
 def test_logs_are_those_of_the_textbook(room, mounting, place):
     scan = scan_of(40, T_base_laser=place, mounting=mounting)
-    logs, used = RayModel(room, BEAM).log_likelihood(somewhere(100), choose_beams(scan, BEAM))
+    logs, used = RayModel(room, BEAM).log_likelihood(somewhere(100), select_beams(scan, BEAM))
     expected, expected_used = brute_force(somewhere(100), scan, room, BEAM)
     assert used == expected_used
     np.testing.assert_allclose(logs, expected, rtol=1e-6)
@@ -87,7 +87,7 @@ def test_other_parameters_of_the_mixture(room):
         laser_max_range=4.0,
     )
     scan = scan_of(40, 1)
-    logs, _ = RayModel(room, config).log_likelihood(somewhere(60, 1), choose_beams(scan, config))
+    logs, _ = RayModel(room, config).log_likelihood(somewhere(60, 1), select_beams(scan, config))
     np.testing.assert_allclose(
         logs, brute_force(somewhere(60, 1), scan, room, config)[0], rtol=1e-6
     )
@@ -98,7 +98,7 @@ def test_moving_map_and_particles_together_changes_nothing(room, move):
     there = OccupancyGrid(room.cells, room.resolution, move @ room.T_map_grid)
     poses = somewhere(200, 2).poses()
     moved = np.column_stack([move.apply(poses[:, :2]), wrap(poses[:, 2] + move.yaw)])
-    beams = choose_beams(scan_of(40, 2, T_base_laser=PLACE), BEAM)
+    beams = select_beams(scan_of(40, 2, T_base_laser=PLACE), BEAM)
     logs, _ = RayModel(room, BEAM).log_likelihood(equal_weights(poses), beams)
     moved_logs, _ = RayModel(there, BEAM).log_likelihood(equal_weights(moved), beams)
     # A ray past the very corner of a cell may turn out either way; of 8000, hardly one does.
@@ -112,7 +112,7 @@ def test_no_pose_explains_a_scan_better_than_the_true_one(room, seed):
     truth = SE2(rng.uniform(3.3, 5.3), rng.uniform(1.6, 5.5), rng.uniform(-3.0, 3.0))
     scan = Lidar(beams=60, sigma_m=0.0, T_base_laser=PLACE).scan(room, truth, rng)
     poses = np.vstack([truth.as_array(), somewhere(300, seed).poses()])
-    logs, _ = RayModel(room, BEAM).log_likelihood(equal_weights(poses), choose_beams(scan, BEAM))
+    logs, _ = RayModel(room, BEAM).log_likelihood(equal_weights(poses), select_beams(scan, BEAM))
     assert logs[1:].max() < logs[0]
 
 
@@ -123,7 +123,7 @@ def one_beam(measured: float, **settings: float) -> float:
     config = AmclConfig(laser_model_type=SensorModel.BEAM, **settings)
     scan = LaserScan(np.array([measured], np.float32), 0.0, 0.1, 0.05, 5.0)
     logs, _ = RayModel(OccupancyGrid(cells, 0.1), config).log_likelihood(
-        equal_weights(np.array([[1.0, 0.55, 0.0]])), choose_beams(scan, config)
+        equal_weights(np.array([[1.0, 0.55, 0.0]])), select_beams(scan, config)
     )
     return float(logs[0])
 
@@ -144,14 +144,14 @@ def test_what_cannot_be_is_only_very_unlikely():
 def test_where_nothing_is_in_reach_no_return_is_what_was_expected(room):
     away = equal_weights(np.array([[100.0, 100.0, 1.0]]))
     scan = LaserScan(np.full(20, math.inf, np.float32), -1.0, 0.1, 0.05, 5.0)
-    logs, used = RayModel(room, BEAM).log_likelihood(away, choose_beams(scan, BEAM))
+    logs, used = RayModel(room, BEAM).log_likelihood(away, select_beams(scan, BEAM))
     assert used == 20
     assert logs[0] == pytest.approx(20 * math.log(0.5 + 0.05))
 
 
 def test_a_scan_without_valid_reading_says_nothing(room):
     scan = LaserScan(np.full(20, math.nan, np.float32), -1.0, 0.1, 0.05, 5.0)
-    logs, used = RayModel(room, BEAM).log_likelihood(somewhere(20), choose_beams(scan, BEAM))
+    logs, used = RayModel(room, BEAM).log_likelihood(somewhere(20), select_beams(scan, BEAM))
     assert used == 0
     assert not logs.any()
 
@@ -161,5 +161,5 @@ def test_a_sensor_without_limit_can_be_used(room):
     config = AmclConfig(laser_model_type=SensorModel.BEAM, laser_max_range=-1.0)
     ranges = np.array([1.0, math.inf, 2.0], np.float32)
     scan = LaserScan(ranges, -1.0, 0.1, 0.05, math.inf)
-    logs, _ = RayModel(room, config).log_likelihood(somewhere(50), choose_beams(scan, config))
+    logs, _ = RayModel(room, config).log_likelihood(somewhere(50), select_beams(scan, config))
     assert np.isfinite(logs).all()

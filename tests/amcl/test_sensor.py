@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from firstfix.amcl.beam_selection import Beams, choose_beams
+from firstfix.amcl.beam_selection import SelectedBeams, select_beams
 from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.amcl.likelihood_field import LikelihoodField
 from firstfix.amcl.particles import Particles, equal_weights
@@ -25,13 +25,15 @@ class Told:
     def __init__(self, logs: list[float], used: int) -> None:
         self.logs, self.used = np.array(logs), used
 
-    def log_likelihood(self, particles: Particles, beams: Beams) -> tuple[NDArray[np.float64], int]:
+    def log_likelihood(
+        self, particles: Particles, beams: SelectedBeams
+    ) -> tuple[NDArray[np.float64], int]:
         return self.logs, self.used
 
 
-def beams_of(n: int) -> Beams:
+def beams_of(n: int) -> SelectedBeams:
     scan = LaserScan(np.full(n, 2.0, np.float32), -1.0, 0.01, 0.1, 8.0)
-    return choose_beams(scan, AmclConfig(max_beams=1000))
+    return select_beams(scan, AmclConfig(max_beams=1000))
 
 
 def three() -> Particles:
@@ -97,7 +99,7 @@ def test_the_place_of_the_sensor_is_found_where_it_is(room, model):
     config = AmclConfig(laser_model_type=model)
     truth = SE2(4.1, 2.7, 0.6)
     lidar = Lidar(beams=60, sigma_m=0.0, T_base_laser=SE2(0.5, 0.2, 1.0))
-    beams = choose_beams(lidar.scan(room, truth, np.random.default_rng(0)), config)
+    beams = select_beams(lidar.scan(room, truth, np.random.default_rng(0)), config)
     around = [truth.as_array() + d for d in np.eye(3) * 0.3] + [
         truth.as_array() - d for d in np.eye(3) * 0.3
     ]

@@ -13,10 +13,10 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan, Mounting
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields, build_fields
-from firstfix.global_localization.answer import to_cells
 from firstfix.global_localization.beams import usable_beams
+from firstfix.global_localization.frames import to_cells
 from firstfix.global_localization.scan_matcher import ScanMatcher
-from firstfix.global_localization.scoring import classify_beams, examine, search_locally
+from firstfix.global_localization.scoring import classify_beams, score_poses, search_locally
 from firstfix.global_localization.verify import verify
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import random_free_poses
@@ -59,7 +59,7 @@ def test_the_true_pose_fits_and_the_others_do_not(hall):
     poses = drawn(hall, 30)
     for truth in poses[:10]:
         scan = seen(hall, truth)
-        for pose, place in zip(poses, examine(scan, poses, hall), strict=True):
+        for pose, place in zip(poses, score_poses(scan, poses, hall), strict=True):
             if pose == truth:
                 assert place.score < 0.3
                 assert place.evidence.explained > 0.95
@@ -73,7 +73,7 @@ def test_a_small_error_is_mended(hall):
     rng = np.random.default_rng(1)
     for truth in drawn(hall, 10, seed=1):
         scan, proposed = seen(hall, truth), off_by(truth, rng, 0.15, 5.0)
-        (place,) = examine(scan, [proposed], hall)
+        (place,) = score_poses(scan, [proposed], hall)
         assert is_at(place.pose, truth, metres=0.05)
         assert place.score < 0.4
 
@@ -89,7 +89,7 @@ def test_none_becomes_another_place_and_none_becomes_worse(hall):
     )
     moved = 0
     for pose, place, score in zip(
-        proposed, examine(scan, proposed, hall), as_given.scores, strict=True
+        proposed, score_poses(scan, proposed, hall), as_given.scores, strict=True
     ):
         assert place.pose.distance_to(pose) <= 0.3 + 1e-9
         assert angle_error(place.pose.yaw, pose.yaw) <= math.radians(10.0) + 1e-9
@@ -101,16 +101,16 @@ def test_none_becomes_another_place_and_none_becomes_worse(hall):
 def test_each_is_judged_by_itself_and_in_its_turn(hall):
     poses = drawn(hall, 12, seed=3)
     scan = seen(hall, poses[5])
-    together = examine(scan, poses, hall)
+    together = score_poses(scan, poses, hall)
     assert len(together) == 12
     for pose, place in zip(poses, together, strict=True):
-        (alone,) = examine(scan, [pose], hall)
+        (alone,) = score_poses(scan, [pose], hall)
         assert (alone.pose, alone.score, alone.probability) == (
             place.pose,
             place.score,
             place.probability,
         )
-    backwards = examine(scan, poses[::-1], hall)
+    backwards = score_poses(scan, poses[::-1], hall)
     assert [place.pose for place in backwards] == [place.pose for place in together][::-1]
 
 
@@ -120,7 +120,7 @@ def test_the_sensor_may_sit_anywhere_on_the_robot(hall, mounting, T_base_laser):
     lidar = Lidar(beams=180, fov=4.0, T_base_laser=T_base_laser, mounting=mounting)
     truth = SE2(4.0, 3.0, 1.0)
     scan = seen(hall, truth, lidar)
-    (place,) = examine(scan, [truth @ SE2(0.1, 0.05, 0.05)], hall)
+    (place,) = score_poses(scan, [truth @ SE2(0.1, 0.05, 0.05)], hall)
     assert is_at(place.pose, truth, metres=0.1, degrees=1.5)
     near = search_locally(scan, truth @ SE2(0.4, 0.3, -0.4), hall)
     assert is_at(near.pose, truth, metres=0.06)
@@ -134,8 +134,8 @@ def test_move_map_and_poses_together_and_nothing_changes(hall):
     truth, *others = drawn(hall, 6, seed=4)
     scan = seen(hall, truth)
     poses = [truth @ SE2(0.1, 0.0, 0.05), *others]
-    here = examine(scan, poses, hall)
-    there = examine(scan, [moved_by @ pose for pose in poses], elsewhere)
+    here = score_poses(scan, poses, hall)
+    there = score_poses(scan, [moved_by @ pose for pose in poses], elsewhere)
     for a, b in zip(here, there, strict=True):
         assert b.score == pytest.approx(a.score, abs=1e-6)
         assert (moved_by @ a.pose).distance_to(b.pose) < 1e-6
@@ -148,7 +148,7 @@ def test_move_map_and_poses_together_and_nothing_changes(hall):
 def test_outside_of_the_map_nothing_fits(hall):
     scan = seen(hall, SE2(4.0, 3.0, 1.0))
     for pose in (SE2(-50.0, 3.0, 0.0), SE2(4.0, 1e6, 1.0), SE2(1e12, -1e12, 0.0)):
-        (place,) = examine(scan, [pose], hall)
+        (place,) = score_poses(scan, [pose], hall)
         assert place.score > 2.3
         assert place.evidence.explained == 0.0
         assert search_locally(scan, pose, hall).score > 2.3
@@ -194,7 +194,7 @@ def test_two_calls_agree_to_the_last_bit(hall):
 def test_a_blind_scan_says_neither_yes_nor_no(hall, value):
     truth = SE2(4.0, 3.0, 1.0)
     blind = dataclasses.replace(seen(hall, truth), ranges=np.full(180, value, np.float32))
-    (place,) = examine(blind, [truth], hall)
+    (place,) = score_poses(blind, [truth], hall)
     assert place.pose == truth
     assert place.evidence.beams == 0
     assert place.probability == pytest.approx(0.5)
@@ -215,7 +215,7 @@ def test_what_a_hand_over_the_sensor_leaves_is_not_found_within_a_wall(office_fi
 def test_all_beams_are_sorted_and_few_enough_as_they_are_counted(hall):
     (pose,) = drawn(hall, 1)
     scan = seen(hall, pose)
-    (judged,) = examine(scan, [pose], hall)
+    (judged,) = score_poses(scan, [pose], hall)
     classes = classify_beams(scan, judged.pose, hall)
     assert len(classes) == len(usable_beams(scan)) == judged.evidence.beams
     shares = np.bincount(classes, minlength=4) / len(classes)

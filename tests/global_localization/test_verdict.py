@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from firstfix.core.estimate import Evidence, Verdict
-from firstfix.global_localization.verdict import judge, place_probabilities
+from firstfix.core.scan import LaserScan
+from firstfix.global_localization.verdict import judge, nothing_to_match, place_probabilities
 
 costs = arrays(np.float64, st.integers(1, 30), elements=st.floats(0.0, 8.0)).map(np.sort)
 GOOD = Evidence(explained=0.9, short=0.08, through_wall=0.02, unknown=0.0, beams=180)
@@ -124,3 +125,16 @@ def test_fewer_beams_are_less_sure():
     np.testing.assert_array_equal(
         place_probabilities(scores, 30), place_probabilities(scores, 2000)
     )
+
+
+@given(st.integers(0, 30), st.integers(0, 7), st.integers(1, 8))
+def test_a_scan_with_too_few_hits_is_answered_with_their_number(n, hits, needed):
+    scan = LaserScan(np.full(n + 1, np.nan, np.float32), 0.0, 0.1, 0.1, 5.0)
+    result = nothing_to_match(scan, hits, needed, 0.25)
+    assert result.verdict is Verdict.NO_MATCH
+    assert f"only {hits} of {n + 1} beams" in result.reason
+    assert f"{needed} are needed" in result.reason
+    assert result.hypotheses == ()
+    assert result.best is None
+    assert not result.search.proven
+    assert result.elapsed_s == 0.25

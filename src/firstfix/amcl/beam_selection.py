@@ -17,8 +17,8 @@ _FARTHEST_M = 1000.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Beams:
-    """Beams of a scan as the filter uses them.
+class SelectedBeams:
+    """SelectedBeams of a scan as the filter uses them.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Beams:
         return self.ends[self.ranges < self.range_max]
 
 
-def choose_beams(scan: LaserScan, config: AmclConfig) -> Beams:
+def select_beams(scan: LaserScan, config: AmclConfig) -> SelectedBeams:
     """Choose evenly spaced beams.
 
     Parameters
@@ -64,7 +64,7 @@ def choose_beams(scan: LaserScan, config: AmclConfig) -> Beams:
 
     Returns
     -------
-    Beams
+    SelectedBeams
         At most max_beams of the scan; those without a valid reading are left out.
     """
     range_max = min(scan.range_max, _FARTHEST_M)
@@ -79,7 +79,7 @@ def choose_beams(scan: LaserScan, config: AmclConfig) -> Beams:
         index, ranges = index[~near], ranges[~near]
     bearings = scan.bearings[index]
     ends = np.column_stack([ranges * np.cos(bearings), ranges * np.sin(bearings)])
-    return Beams(
+    return SelectedBeams(
         bearings=bearings + scan.T_base_laser.yaw,
         ranges=ranges,
         ends=scan.T_base_laser.apply(ends),

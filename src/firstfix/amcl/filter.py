@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.amcl.beam_selection import choose_beams
+from firstfix.amcl.beam_selection import select_beams
 from firstfix.amcl.clusters import Cluster, find_clusters
 from firstfix.amcl.config import AmclConfig, MotionModel
 from firstfix.amcl.kld import adapted_size
@@ -118,7 +118,7 @@ def step(
     particles = propagate(state.particles, increment, config, rng)
     if _at_rest(increment, config):
         particles = _roughened(particles, rng)
-    likelihood, fit = weigh(particles, choose_beams(scan, config), sensor)
+    likelihood, fit = weigh(particles, select_beams(scan, config), sensor)
     particles = particles.reweighed(likelihood)
     # Walls on one side cut a belief short there, and its mean lies off its peak. Where the robot
     # most likely is, is asked of a belief that counts the scan double.

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from firstfix.amcl.beam_selection import Beams
+from firstfix.amcl.beam_selection import SelectedBeams
 from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.amcl.particles import Particles
 from firstfix.core.grid import OccupancyGrid
@@ -48,14 +48,16 @@ class LikelihoodField:
         # As large as the map: not for those who skip nothing, and not anew for every scan.
         self._explained = self._near_walls() if prob and config.do_beamskip else None
 
-    def log_likelihood(self, particles: Particles, beams: Beams) -> tuple[NDArray[np.float64], int]:
+    def log_likelihood(
+        self, particles: Particles, beams: SelectedBeams
+    ) -> tuple[NDArray[np.float64], int]:
         """Judge every particle by a scan.
 
         Parameters
         ----------
         particles : Particles
             n particles.
-        beams : Beams
+        beams : SelectedBeams
             The scan.
 
         Returns

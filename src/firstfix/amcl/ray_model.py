@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from firstfix.amcl.beam_selection import Beams
+from firstfix.amcl.beam_selection import SelectedBeams
 from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.particles import Particles
 from firstfix.core.grid import OccupancyGrid
@@ -36,14 +36,16 @@ class RayModel:
         self.clearance = chessboard_clearance(grid.occupied)
         self.clearance.flags.writeable = False
 
-    def log_likelihood(self, particles: Particles, beams: Beams) -> tuple[NDArray[np.float64], int]:
+    def log_likelihood(
+        self, particles: Particles, beams: SelectedBeams
+    ) -> tuple[NDArray[np.float64], int]:
         """Judge every particle by a scan.
 
         Parameters
         ----------
         particles : Particles
             n particles.
-        beams : Beams
+        beams : SelectedBeams
             The scan.
 
         Returns

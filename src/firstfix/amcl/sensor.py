@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.amcl.beam_selection import Beams
+from firstfix.amcl.beam_selection import SelectedBeams
 from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.amcl.likelihood_field import LikelihoodField
 from firstfix.amcl.particles import Particles
@@ -24,7 +24,9 @@ INDEPENDENT_BEAMS = 15
 class Sensor(Protocol):
     """A sensor model with its map."""
 
-    def log_likelihood(self, particles: Particles, beams: Beams) -> tuple[NDArray[np.float64], int]:
+    def log_likelihood(
+        self, particles: Particles, beams: SelectedBeams
+    ) -> tuple[NDArray[np.float64], int]:
         """Return the log-likelihood of a scan at each particle, and of how many beams."""
 
 
@@ -48,14 +50,16 @@ def build_sensor(grid: OccupancyGrid, config: AmclConfig) -> Sensor:
     return LikelihoodField(grid, config)
 
 
-def weigh(particles: Particles, beams: Beams, sensor: Sensor) -> tuple[NDArray[np.float64], float]:
+def weigh(
+    particles: Particles, beams: SelectedBeams, sensor: Sensor
+) -> tuple[NDArray[np.float64], float]:
     """Judge every particle by a scan.
 
     Parameters
     ----------
     particles : Particles
         The belief, n particles.
-    beams : Beams
+    beams : SelectedBeams
         The scan.
     sensor : Sensor
         The sensor model.

@@ -103,7 +103,7 @@ def serve_simulated(
     InputError
         If it cannot be served there.
     """
-    from firstfix.global_localization.answer import check_searchable
+    from firstfix.global_localization.searchable import check_searchable
     from firstfix.lab.live.simulated_node import SimNode
     from firstfix.lab.live.steered_robot import SimRobot
     from firstfix.web.feed import Feed
@@ -153,7 +153,7 @@ def serve_robot(robot: str, map_path: Path, arguments: list[str], address: Addre
         If the map or an argument cannot be used, or the page cannot be served there.
     """
     from firstfix.cli.nodes import runner
-    from firstfix.global_localization.answer import check_searchable
+    from firstfix.global_localization.searchable import check_searchable
     from firstfix.io.maps.map_server import load_map
     from firstfix.web.background_page import PageBeside
     from firstfix.web.server import listen

@@ -95,8 +95,8 @@ def look_around(grid: OccupancyGrid, lidar: Lidar, samples: int | None, seed: in
     import numpy as np
 
     from firstfix.fields.cache import cache_folder
-    from firstfix.global_localization.answer import check_searchable
     from firstfix.global_localization.scan_matcher import ScanMatcher
+    from firstfix.global_localization.searchable import check_searchable
     from firstfix.lab.experiments.perceptual_aliasing import look_from
     from firstfix.lab.worlds.catalog import random_free_poses
 

@@ -21,9 +21,10 @@ from firstfix.core.estimate import Hypothesis, LocateResult, SearchReport, Verdi
 from firstfix.core.scan import LaserScan
 from firstfix.fields.map_fields import MapFields
 from firstfix.fields.phased_field import PhasedField, lay_out
-from firstfix.global_localization.answer import nothing_to_match, to_map
 from firstfix.global_localization.beams import Beams, usable_beams
+from firstfix.global_localization.frames import to_map
 from firstfix.global_localization.places import distinct_places
+from firstfix.global_localization.verdict import nothing_to_match
 from firstfix.global_localization.verify import verify
 
 

@@ -15,20 +15,15 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields, build_fields
 from firstfix.global_localization import exhaustive
-from firstfix.global_localization.answer import (
-    check_positions,
-    check_searchable,
-    nothing_to_match,
-    verified_place,
-)
 from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
 from firstfix.global_localization.config import LocateConfig, Method
 from firstfix.global_localization.places import distinct_places
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
-from firstfix.global_localization.scoring import examine, search_locally
+from firstfix.global_localization.scoring import score_poses, search_locally
 from firstfix.global_localization.search import search
-from firstfix.global_localization.verdict import judge, place_probabilities
-from firstfix.global_localization.verify import Verification, verify
+from firstfix.global_localization.searchable import check_positions, check_searchable
+from firstfix.global_localization.verdict import judge, nothing_to_match, place_probabilities
+from firstfix.global_localization.verify import Verification, verified_place, verify
 
 # A third of the beams sorts out most places; the rest is spent on those that stay.
 FIRST_LOOK_BEAMS = 60
@@ -95,7 +90,7 @@ class ScanMatcher:
         poses = exhaustive.FAST if self.method is Method.PAPER else exhaustive.BASIC
         return exhaustive.locate(scan, self.fields, poses)
 
-    def examine(self, scan: LaserScan, poses: Sequence[SE2]) -> tuple[Hypothesis, ...]:
+    def score_poses(self, scan: LaserScan, poses: Sequence[SE2]) -> tuple[Hypothesis, ...]:
         """Tell how well a scan fits each of some poses: `firstfix.global_localization.scoring`.
 
         Parameters
@@ -110,7 +105,7 @@ class ScanMatcher:
         tuple of Hypothesis
             One for each pose; the probability is that of the place against a wrong map.
         """
-        return examine(scan, poses, self.fields)
+        return score_poses(scan, poses, self.fields)
 
     def search_locally(self, scan: LaserScan, T_map_base: SE2) -> Hypothesis:
         """Find the best pose within about a metre and 40 degrees of a given one.

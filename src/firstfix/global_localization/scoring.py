@@ -13,11 +13,16 @@ from firstfix.core.estimate import Hypothesis
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
-from firstfix.global_localization.answer import to_cells, verified_place
 from firstfix.global_localization.beams import Beams, usable_beams
+from firstfix.global_localization.frames import to_cells
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.verdict import place_probabilities
-from firstfix.global_localization.verify import Verification, classes_of_beams, verify
+from firstfix.global_localization.verify import (
+    Verification,
+    classes_of_beams,
+    verified_place,
+    verify,
+)
 
 # Refinement may mend what a tracker leaves open, not find another place.
 _SAME_PLACE_M = 0.3
@@ -32,7 +37,7 @@ _FIRST_LOOK_BEAMS = 60
 _SECOND_LOOK = 8
 
 
-def examine(scan: LaserScan, poses: Sequence[SE2], fields: MapFields) -> tuple[Hypothesis, ...]:
+def score_poses(scan: LaserScan, poses: Sequence[SE2], fields: MapFields) -> tuple[Hypothesis, ...]:
     """Tell how well a scan fits each of some poses, allowing for small errors.
 
     Parameters

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.core.estimate import Evidence, Verdict
+from firstfix.core.estimate import Evidence, LocateResult, SearchReport, Verdict
+from firstfix.core.scan import LaserScan
 
 # How noisy this scan is in this map (people, moved chairs, a careless drawing) is not known
 # beforehand. Left open, it makes the likelihood of a place a power of its mean cost (the marginal
@@ -106,3 +107,15 @@ def judge(
     else:
         reason = f"{fit} here, but others not badly enough to be sure{doubt}"
     return Verdict.AMBIGUOUS, reason
+
+
+def nothing_to_match(scan: LaserScan, hits: int, needed: int, elapsed_s: float) -> LocateResult:
+    """Answer a legal scan with fewer beams on surfaces than are needed."""
+    return LocateResult(
+        verdict=Verdict.NO_MATCH,
+        reason=f"only {hits} of {len(scan)} beams measured a surface, {needed} are needed: "
+        "blocked sensor, open space, or limits range_min and range_max that do not fit it",
+        hypotheses=(),
+        search=SearchReport(poses=0, searched=0.0, proven=False),
+        elapsed_s=elapsed_s,
+    )

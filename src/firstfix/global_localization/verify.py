@@ -9,10 +9,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from firstfix.core.estimate import Evidence
+from firstfix.core.estimate import Evidence, Hypothesis
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.scan import LaserScan
 from firstfix.fields.map_fields import MapFields
 from firstfix.fields.raycast import cast_ray_leaping
 from firstfix.global_localization.beams import Beams
+from firstfix.global_localization.frames import to_map
 
 BEAMS = 180
 
@@ -81,6 +84,44 @@ def verify(poses: NDArray[np.float64], beams: Beams, fields: MapFields) -> Verif
     """
     scores, counts, _ = _compared(poses, beams.thinned(BEAMS), fields)
     return Verification(poses, scores, counts)
+
+
+def verified_place(
+    grid: OccupancyGrid,
+    scan: LaserScan,
+    verification: Verification,
+    i: int,
+    covariance: NDArray[np.float64],
+    probability: float,
+) -> Hypothesis:
+    """Bring a pose that was verified to a hypothesis in the map.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+    scan : LaserScan
+        Knows where the sensor sits.
+    verification : Verification
+        Of several poses.
+    i : int
+        Which of them it is.
+    covariance : ndarray, shape (3, 3)
+        Of x, y (cells), heading (rad) of the sensor in the grid.
+    probability : float
+        That it is the right place, 0 to 1.
+
+    Returns
+    -------
+    Hypothesis
+        For ``T_map_base``.
+    """
+    return Hypothesis(
+        *to_map(grid, scan, verification.poses[i], covariance),
+        score=float(verification.scores[i]),
+        probability=probability,
+        evidence=verification.evidence(i),
+    )
 
 
 def classes_of_beams(

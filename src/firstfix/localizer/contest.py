@@ -157,7 +157,7 @@ class Contest:
         Who is dropped could not be told from a place that nobody has thought of yet.
         """
         poses = [entry.T_map_odom @ T_odom_base for entry in self._entries]
-        examined = self._matcher.examine(scan, poses)
+        examined = self._matcher.score_poses(scan, poses)
         scores = np.array([*(place.score for place in examined), self._config.won_cost])
         *logs, unlisted = _NEWS * log_likelihoods(scores, examined[0].evidence.beams)
         self._log_unlisted += float(unlisted)

@@ -92,7 +92,7 @@ class Watch:
         Look
             The finding. ELSEWHERE needs several scans in a row that agree.
         """
-        (tracked,) = self._matcher.examine(scan, [T_map_base])
+        (tracked,) = self._matcher.score_poses(scan, [T_map_base])
         if np.count_nonzero(usable_beams(scan).hit) < FEWEST_HITS:
             return Look(Finding.SILENT, tracked)  # a hand before the sensor is no evidence
         if tracked.score <= self._config.doubtful_cost:

@@ -13,7 +13,7 @@ from typing import Any
 from firstfix.core.errors import InputError, MapError
 from firstfix.core.scan import LaserScan
 from firstfix.fields.cache import cache_folder
-from firstfix.global_localization.answer import check_searchable
+from firstfix.global_localization.searchable import check_searchable
 from firstfix.io.maps.map_server import load_map
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.inputs import Input, NewMap

@@ -23,7 +23,6 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields, build_fields
-from firstfix.global_localization.answer import nothing_to_match, verified_place
 from firstfix.global_localization.beams import FEWEST_HITS, Beams, usable_beams
 from firstfix.global_localization.config import LocateConfig
 from firstfix.global_localization.places import distinct_places
@@ -35,8 +34,8 @@ from firstfix.global_localization.scan_matcher import (
     worth_listing,
 )
 from firstfix.global_localization.search import Candidates, search
-from firstfix.global_localization.verdict import judge, place_probabilities
-from firstfix.global_localization.verify import verify
+from firstfix.global_localization.verdict import judge, nothing_to_match, place_probabilities
+from firstfix.global_localization.verify import verified_place, verify
 from firstfix.lab.experiments.case import Case, evenly_spaced, known_truth
 from firstfix.lab.experiments.case_runs import try_scan
 from firstfix.lab.metrics.metrics import summarize, total

@@ -5,24 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from firstfix.core.angles import wrap
-from firstfix.core.errors import MapError
-from firstfix.core.estimate import Verdict
-from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.fields.map_fields import build_fields
-from firstfix.global_localization.answer import (
-    check_positions,
-    check_searchable,
-    nothing_to_match,
-    to_cells,
-    to_map,
-)
+from firstfix.global_localization.frames import to_cells, to_map
 
 metres = st.floats(-50.0, 50.0)
 poses = st.builds(SE2, metres, metres, st.floats(-4.0, 4.0))
@@ -107,43 +97,3 @@ def test_a_drawn_case():
     np.testing.assert_allclose(T_map_base.as_array(), [0.0, 4.5, math.pi / 2], atol=1e-12)
     # Grid x is map y; half a metre of lever turns 0.1 rad of heading into 0.05 m across.
     np.testing.assert_allclose(np.diag(moved), [0.01 + 0.25 * 0.01, 0.04, 0.01], atol=1e-12)
-
-
-@settings(deadline=None)
-@given(st.integers(0, 30), st.integers(0, 7), st.integers(1, 8))
-def test_nothing_to_match_says_how_much_was_seen(n, hits, needed):
-    scan = LaserScan(np.full(n + 1, np.nan, np.float32), 0.0, 0.1, 0.1, 5.0)
-    result = nothing_to_match(scan, hits, needed, 0.25)
-    assert result.verdict is Verdict.NO_MATCH
-    assert f"only {hits} of {n + 1} beams" in result.reason
-    assert f"{needed} are needed" in result.reason
-    assert result.hypotheses == ()
-    assert result.best is None
-    assert not result.search.proven
-    assert result.elapsed_s == 0.25
-
-
-@pytest.mark.parametrize(
-    ("value", "missing"), [(FREE, "occupied"), (UNKNOWN, "occupied"), (OCCUPIED, "free")]
-)
-def test_a_map_of_one_kind_cannot_be_searched(value, missing):
-    with pytest.raises(MapError, match=f"none of them {missing}"):
-        check_searchable(OccupancyGrid(np.full((5, 7), value, np.int8), 0.05))
-
-
-def test_free_space_that_nobody_has_seen_is_no_place_to_be():
-    cells = np.array([[FREE, OCCUPIED]], np.int8)
-    with pytest.raises(MapError, match="none of them free"):
-        check_searchable(OccupancyGrid(cells, 0.05, unseen=np.array([[True, False]])))
-
-
-def test_one_wall_and_one_free_cell_can():
-    check_searchable(OccupancyGrid(np.array([[FREE, OCCUPIED]], np.int8), 0.05))
-
-
-def test_free_space_must_be_wide_enough_to_stand_in():
-    narrow = np.full((30, 30), OCCUPIED, np.int8)
-    narrow[:, 1] = FREE  # 5 cm wide
-    with pytest.raises(MapError, match="30 free cells"):
-        check_positions(build_fields(OccupancyGrid(narrow, 0.05), None))
-    check_positions(build_fields(OccupancyGrid(narrow, 0.25), None))
