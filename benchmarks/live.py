@@ -35,10 +35,10 @@ from firstfix.lab.worlds.office import office
 from firstfix.localizer.inputs import NewMap
 from firstfix.localizer.outputs import Status, TrackedPose
 from firstfix.localizer.states import State
-from firstfix.web.feed import Feed
+from firstfix.web.command_executor import CommandExecutor
 from firstfix.web.page import Page
 from firstfix.web.server import listen, make_server, url_of
-from firstfix.web.steering import Steering
+from firstfix.web.snapshot_store import SnapshotStore
 
 BEAMS, PARTICLES, HZ = 720, 2000, 20
 LIDAR = Lidar(beams=BEAMS, dropout=0.01)
@@ -56,9 +56,9 @@ def scans(count: int) -> list[tuple[SE2, LaserScan]]:
 def serve(pipe: Connection) -> None:
     """Show frames until told to end; answer every word with CPU time and memory so far."""
     grid, placed = office(), scans(POSES)
-    feed = Feed("office")
+    store = SnapshotStore("office")
     localizer: Any = SimpleNamespace(matcher=ScanMatcher(grid), particles=None)
-    feed(NewMap(0.0, grid), [], localizer)
+    store(NewMap(0.0, grid), [], localizer)
     is_over = threading.Event()
 
     def show() -> None:
@@ -76,11 +76,11 @@ def serve(pipe: Connection) -> None:
             localizer.particles = beliefs[i % POSES]
             tracked = TrackedPose(stamp, pose, NOWHERE, pose)
             status = Status(stamp, State.LOCALIZED, "100% of the beams fit", evidence)
-            feed(replace(scan, stamp=stamp), [tracked, status], localizer)
+            store(replace(scan, stamp=stamp), [tracked, status], localizer)
 
     showing = threading.Thread(target=show)
     with listen("127.0.0.1", 0) as listening:
-        server = make_server(Page("sim", feed, Steering(feed, lambda _: None)))
+        server = make_server(Page("sim", store, CommandExecutor(store, lambda _: None)))
         serving = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
         serving.start()
         showing.start()

@@ -46,11 +46,11 @@ from firstfix.io.ros_messages.incoming import (
 )
 from firstfix.io.saved_pose import SavedPose, load_pose, save_pose
 from firstfix.ros.arguments import settings_from
-from firstfix.web.commands import order_of
+from firstfix.web.commands import decode_command
 from firstfix.web.locate_queue import LocateQueue
 from firstfix.web.request_body import JSON, NPZ
+from firstfix.web.snapshot import ActiveMap
 from firstfix.web.strict_json import parsed
-from firstfix.web.view import ShownMap
 
 MAX_CELLS = 1_000_000
 _HEADER = b"image: map.%s\nresolution: 0.05\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n"
@@ -146,7 +146,7 @@ def read_node_argument(data: bytes, _: Path) -> None:
 
 def read_order(data: bytes, _: Path) -> None:
     """Read what a viewer of the live page asks for."""
-    order_of(parsed(data))
+    decode_command(parsed(data))
 
 
 def _search_for(kind: str) -> Target:
@@ -158,11 +158,11 @@ def _search_for(kind: str) -> Target:
 
 
 @functools.cache
-def _small_map() -> ShownMap:
+def _small_map() -> ActiveMap:
     cells = np.zeros((40, 60), np.int8)
     cells[[0, -1]] = cells[:, [0, -1]] = cells[20, 10:30] = 100
     grid = OccupancyGrid(cells, 0.1)
-    return ShownMap("small", "key", grid, ScanMatcher(grid))
+    return ActiveMap("small", "key", grid, ScanMatcher(grid))
 
 
 # What each type of message is made into; with DDS, its bytes come from whoever is in the network.

@@ -161,7 +161,7 @@ def test_a_picture_of_the_demo_needs_the_story(cli) -> None:
 
 def test_a_browser_is_opened_only_where_somebody_sits(monkeypatch, capsys) -> None:
     from firstfix.cli import live
-    from firstfix.web.guard import Access
+    from firstfix.web.access_control import AccessPolicy
     from firstfix.web.server import listen
 
     opened: list[str] = []
@@ -170,13 +170,13 @@ def test_a_browser_is_opened_only_where_somebody_sits(monkeypatch, capsys) -> No
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     with listen("127.0.0.1", 0) as listening:
-        live._tell(listening, Access())
+        live._tell(listening, AccessPolicy())
         assert opened == []
         monkeypatch.setenv("DISPLAY", ":0")
-        live._tell(listening, Access())
+        live._tell(listening, AccessPolicy())
         assert opened == []  # in a pipe
         monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-        live._tell(listening, Access(TOKEN))
+        live._tell(listening, AccessPolicy(TOKEN))
     (url,) = opened
     assert url.endswith(f"#token={TOKEN}")
     assert url in capsys.readouterr().out

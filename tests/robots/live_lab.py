@@ -17,11 +17,11 @@ from firstfix.lab.live.steered_robot import SimRobot
 from firstfix.lab.worlds.catalog import WORLDS
 from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
-from firstfix.web.feed import Feed
-from firstfix.web.guard import Access
+from firstfix.web.access_control import AccessPolicy
+from firstfix.web.command_executor import CommandExecutor
 from firstfix.web.page import Page
 from firstfix.web.server import listen, make_server, url_of
-from firstfix.web.steering import Steering
+from firstfix.web.snapshot_store import SnapshotStore
 
 WAIT_S = 180.0
 
@@ -47,8 +47,8 @@ class Site:
     robot: SimRobot | None = None
 
     @property
-    def feed(self) -> Feed:
-        return self.page.feed
+    def store(self) -> SnapshotStore:
+        return self.page.store
 
     @property
     def live(self) -> str:
@@ -71,23 +71,25 @@ def served(page: Page) -> Iterator[str]:
 
 
 @contextmanager
-def fed(access: Access | None = None, feed: Feed | None = None) -> Iterator[Site]:
+def fed(access: AccessPolicy | None = None, store: SnapshotStore | None = None) -> Iterator[Site]:
     """Serve a page of which nothing is known but what the test feeds it."""
     given: list[Input] = []
-    feed = feed or Feed("test")
-    page = Page("ros2", feed, Steering(feed, given.append), access or Access())
+    store = store or SnapshotStore("test")
+    page = Page("ros2", store, CommandExecutor(store, given.append), access or AccessPolicy())
     with served(page) as url:
         yield Site(page, url, given)
 
 
 @contextmanager
-def simulated(grid: OccupancyGrid, seed: int = 1, access: Access | None = None) -> Iterator[Site]:
+def simulated(
+    grid: OccupancyGrid, seed: int = 1, access: AccessPolicy | None = None
+) -> Iterator[Site]:
     """Serve a simulated robot."""
-    feed = Feed("house")
+    store = SnapshotStore("house")
     robot = SimRobot(grid, seed)
     wrong: list[str] = []
-    node = SimNode(grid, robot, [feed], feed.know, wrong.append)
-    page = Page("sim", feed, Steering(feed, node.give, robot), access or Access())
+    node = SimNode(grid, robot, [store], store.set_truth, wrong.append)
+    page = Page("sim", store, CommandExecutor(store, node.give, robot), access or AccessPolicy())
     with served(page) as url:
         node.start()
         try:
@@ -103,16 +105,16 @@ class Drive:
 
     robot: SimRobot
     localizer: Localizer
-    feed: Feed
+    store: SnapshotStore
 
     def give(self, given: Input) -> None:
-        self.feed(given, self.localizer.handle(given), self.localizer)
+        self.store(given, self.localizer.handle(given), self.localizer)
 
     def step(self, scans: int = 1) -> None:
         for _ in range(scans):
             moment = self.robot.step()
             if moment is not None:
-                self.feed.know(moment.T_map_base)
+                self.store.set_truth(moment.T_map_base)
                 for event in moment.events:
                     self.give(event)
 
@@ -120,6 +122,6 @@ class Drive:
 def drive(world: str = "house", seed: int = 1) -> Drive:
     """Put a robot into a world, with its map and not yet a scan."""
     grid = WORLDS[world]()
-    begun = Drive(SimRobot(grid, seed), Localizer(), Feed(world))
+    begun = Drive(SimRobot(grid, seed), Localizer(), SnapshotStore(world))
     begun.give(NewMap(0.0, grid))
     return begun

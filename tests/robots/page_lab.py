@@ -186,14 +186,14 @@ class Visit:
 
     def events(self) -> list[str]:
         """Return the timeline, newest first."""
-        return self.page.matcher("#events li span").all_inner_texts()
+        return self.page.locator("#events li span").all_inner_texts()
 
     def wait_for_fix(self) -> None:
         """Wait until a robot that is not held knows where it is."""
         self.wait_for_map()
         wait_until(lambda: self.data("state") != "CONNECTING", lambda: "the robot says something")
         if self.page.is_visible("#paused"):
-            self.page.matcher("#pause").click()
+            self.page.locator("#pause").click()
         self.wait_for_state("LOCALIZED")
         self._heard = len(self.events())
 

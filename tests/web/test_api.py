@@ -14,7 +14,7 @@ from live_lab import Site, drive, fed
 from PIL import Image
 
 from firstfix.localizer.inputs import PoseHint, Reset
-from firstfix.web.guard import Access
+from firstfix.web.access_control import AccessPolicy
 from firstfix.web.messages import map_object
 from firstfix.web.request_body import MOST_BYTES
 
@@ -25,7 +25,7 @@ JSON = {"content-type": "application/json"}
 def site() -> Iterator[Site]:
     begun = drive("house")
     begun.step(22)
-    with fed(feed=begun.feed) as site:
+    with fed(store=begun.store) as site:
         yield site
 
 
@@ -56,14 +56,14 @@ def test_the_page_and_its_files(api):
 
 def test_where_the_robot_is(api, site):
     status = api.get("/v1/status").json()
-    view = site.feed.view
+    view = site.store.snapshot
     assert (status["type"], status["state"], status["stamp"]) == ("state", "LOCALIZED", view.stamp)
     assert status["pose"] == [view.pose.x, view.pose.y, view.pose.yaw]
     assert status["viewers"] == 0
 
 
 def test_the_map(api, site):
-    assert api.get("/v1/map").json() == map_object(site.feed.view.map)
+    assert api.get("/v1/map").json() == map_object(site.store.snapshot.map)
 
 
 def test_the_picture_of_the_map(api, site):
@@ -228,7 +228,7 @@ def test_before_there_is_a_map():
 
 
 def test_who_may_only_watch(site):
-    with fed(Access(may_steer=False), site.feed) as watched:
+    with fed(AccessPolicy(may_steer=False), site.store) as watched:
         with httpx.Client(base_url=watched.url) as api:
             pose = {"x": 1, "y": 2, "yaw": 3}
             assert "read-only" in detail(api.post("/v1/pose", json=pose), 403)
@@ -241,7 +241,7 @@ def test_an_error_of_ours_tells_nothing_to_clients(site, monkeypatch, caplog):
     def broken(*_: object) -> None:
         raise RuntimeError("the password is hunter2")
 
-    monkeypatch.setattr("firstfix.web.api.state_object", broken)
+    monkeypatch.setattr("firstfix.web.api.state_message", broken)
     answer = httpx.get(site.url + "v1/status")
     assert "its log has more" in detail(answer, 500)
     assert "hunter2" not in answer.text

@@ -17,8 +17,8 @@ from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import WORLDS
 from firstfix.localizer.inputs import NewMap
 from firstfix.ros.node_config import Mode, NodeConfig
-from firstfix.web.background_page import PageBeside
-from firstfix.web.guard import Access
+from firstfix.web.access_control import AccessPolicy
+from firstfix.web.background_page import BackgroundPage
 from firstfix.web.server import listen, url_of
 
 HOUSE = WORLDS["house"]()
@@ -29,7 +29,7 @@ HERE = SE2(3.0, 2.0, 0.5)
 def ways(recorder: Recorder):
     with (
         listen("127.0.0.1", 0) as listening,
-        PageBeside("dds", "house", Access(), listening) as page,
+        BackgroundPage("dds", "house", AccessPolicy(), listening) as page,
         httpx.Client(base_url=url_of(listening), timeout=30.0) as api,
     ):
         until(lambda: page._server.started)
@@ -66,6 +66,6 @@ def test_before_it_is_configured_there_is_nobody_to_tell(ways):
 
 def test_it_ends_with_its_context(recorder: Recorder):
     before = threading.active_count()
-    with listen("127.0.0.1", 0) as listening, PageBeside("dds", "a", Access(), listening):
+    with listen("127.0.0.1", 0) as listening, BackgroundPage("dds", "a", AccessPolicy(), listening):
         pass
     assert threading.active_count() == before

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from firstfix.core.errors import InputError
-from firstfix.web.commands import FARTHEST_M, ORDERS, Entry, order_of
+from firstfix.web.commands import COMMANDS, FARTHEST_M, Entry, decode_command
 from firstfix.web.strict_json import NotJsonError, parsed
 
 GOOD = {
@@ -29,21 +29,21 @@ json_values = st.recursive(
     max_leaves=10,
 )
 names = st.sampled_from(["type", "x", "y", "yaw", "index", "paused", "count", "token"])
-kinds = st.sampled_from([*ORDERS, "hello", "", "POSE"])
+kinds = st.sampled_from([*COMMANDS, "hello", "", "POSE"])
 
 
-@pytest.mark.parametrize("kind", ORDERS)
+@pytest.mark.parametrize("kind", COMMANDS)
 def test_each_order_is_understood(kind):
-    order = order_of({"type": kind, **GOOD[kind], "spare": [1]})
+    order = decode_command({"type": kind, **GOOD[kind], "spare": [1]})
     assert (order.kind, order.given) == (kind, GOOD[kind])
 
 
-@pytest.mark.parametrize("kind", ORDERS)
+@pytest.mark.parametrize("kind", COMMANDS)
 def test_each_entry_is_needed(kind):
     for name in GOOD[kind]:
         without = {key: value for key, value in GOOD[kind].items() if key != name}
         with pytest.raises(InputError, match=name):
-            order_of({"type": kind, **without})
+            decode_command({"type": kind, **without})
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ def test_each_entry_is_needed(kind):
 )
 def test_what_cannot_be_meant_is_refused(kind, wrong):
     with pytest.raises(InputError, match=next(iter(wrong))):
-        order_of({"type": kind, **GOOD[kind], **wrong})
+        decode_command({"type": kind, **GOOD[kind], **wrong})
 
 
 def answered(ask, given_):
@@ -82,12 +82,12 @@ def answered(ask, given_):
 def test_nonsense_is_refused_or_an_order(message, kind):
     if isinstance(message, dict):
         message.setdefault("type", kind)
-    order = answered(order_of, message)
+    order = answered(decode_command, message)
     if order is None:
         return
-    assert set(order.given) == set(ORDERS[order.kind])
+    assert set(order.given) == set(COMMANDS[order.kind])
     for name, value in order.given.items():
-        entry = ORDERS[order.kind][name]
+        entry = COMMANDS[order.kind][name]
         assert type(value) is entry.kind
         assert entry.kind is bool or entry.least <= value <= entry.most
 

@@ -30,7 +30,7 @@ NAMES = ("angle_min", "angle_increment", "range_min", "range_max")
 def site() -> Iterator[Site]:
     begun = drive("house")
     begun.step(22)
-    with fed(feed=begun.feed) as site:
+    with fed(store=begun.store) as site:
         yield site
 
 
@@ -42,7 +42,7 @@ def api(site: Site) -> Iterator[httpx.Client]:
 
 @pytest.fixture
 def scan(site: Site) -> LaserScan:
-    return site.feed.view.placed.scan
+    return site.store.snapshot.scan.scan
 
 
 def as_json(scan: LaserScan) -> dict:
@@ -63,14 +63,14 @@ def without_time(answer: dict) -> dict:
 
 
 def test_the_answer_is_that_of_the_library(api, site, scan):
-    expected = answer_document(0, site.feed.view.map.matcher.locate(scan), None)
+    expected = answer_document(0, site.store.snapshot.map.matcher.locate(scan), None)
     answer = api.post("/v1/locate", json=as_json(scan)).json()
     assert answer["verdict"] == "UNIQUE"
     assert set(answer) == set(expected)
     np.testing.assert_allclose(answer["pose"], expected["pose"], atol=1e-6)
     sent = api.post("/v1/locate", content=as_npz(scan), headers=NPZ).json()
     assert without_time(sent) == without_time(expected)
-    assert site.feed.view.pose is not None  # and the robot is where it was
+    assert site.store.snapshot.pose is not None  # and the robot is where it was
     assert site.given == []
 
 
@@ -186,7 +186,7 @@ def test_nonsense_is_refused_or_answered(api, scan, body, completed):
 
 def test_a_few_wait_for_their_turn_and_the_rest_are_sent_away(api, site, scan, monkeypatch):
     begun, go = threading.Event(), threading.Event()
-    matcher = site.feed.view.map.matcher
+    matcher = site.store.snapshot.map.matcher
     right = type(matcher).locate
 
     def slow(self, scan):
@@ -212,7 +212,7 @@ def test_a_few_wait_for_their_turn_and_the_rest_are_sent_away(api, site, scan, m
 
 
 def test_many_poses_of_a_house_are_found_through_the_api(api, site):
-    grid = site.feed.view.map.grid
+    grid = site.store.snapshot.map.grid
     robot = drive("house").robot
     lidar = robot._scenario.lidar
     rng = np.random.default_rng(0)

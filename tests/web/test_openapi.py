@@ -10,7 +10,7 @@ import pytest
 from live_lab import drive, fed
 
 from firstfix.web.api import Api
-from firstfix.web.hub import Hub
+from firstfix.web.broadcaster import Broadcaster
 from firstfix.web.openapi import document
 
 REFS = "#/components/schemas/"
@@ -34,8 +34,8 @@ def test_what_is_referred_to_is_there_and_the_other_way_round():
 
 def test_every_route_is_described_with_its_method():
     begun = drive("house")
-    hub = Hub(begun.feed, str, lambda: None)
-    routes = Api(None, hub).routes()
+    broadcaster = Broadcaster(begun.store, str, lambda: None)
+    routes = Api(None, broadcaster).routes()
     served = {(route.path, method) for route in routes for method in route.methods - {"HEAD"}}
     described = {
         (path, method.upper())
@@ -66,7 +66,7 @@ def test_a_stranger_who_has_only_read_the_document_finds_no_fault():
         # Any bytes may be an .npz, as far as a schema can say.
         *("--exclude-checks", "positive_data_acceptance"),
     )
-    with fed(feed=begun.feed) as site:
+    with fed(store=begun.store) as site:
         command = [sys.executable, "-m", "schemathesis.cli", "run", site.url + "openapi.json"]
         ended = subprocess.run(
             [*command, *arguments], capture_output=True, text=True, timeout=240, check=False

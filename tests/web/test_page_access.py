@@ -94,7 +94,7 @@ def test_who_may_only_watch_sees_no_action(visit: Visitor, watched: Server) -> N
     page.page.mouse.up()
     assert page.data("mode") == "look"
     page.page.keyboard.press("?")
-    assert page.page.matcher("#help-dialog .steer:visible").count() == 0
+    assert page.page.locator("#help-dialog .steer:visible").count() == 0
     assert not [text for text in page.events() if "search anew" in text]
 
 
@@ -102,5 +102,5 @@ def test_several_watch_at_once(visit: Visitor, watched: Server) -> None:
     pages = [visit(watched.url) for _ in range(3)]
     for page in pages:
         page.wait_for_state("LOCALIZED")
-    viewers = pages[0].page.matcher("#viewers")
+    viewers = pages[0].page.locator("#viewers")
     wait_until(lambda: int(viewers.inner_text()) >= 3, viewers.inner_text)

@@ -154,13 +154,13 @@ def test_picking_a_place_resolves_an_ambiguous_start(
     if way == "ghost":
         page.click_on_map(*places[index]["pose"][:2])
     else:
-        button = page.page.matcher(".place").nth(index)
+        button = page.page.locator(".place").nth(index)
         button.focus()
         page.page.keyboard.press("Enter")
     page.page.click("#pause")
     page.wait_for_state("LOCALIZED")
     wait_until(lambda: error_of(page) < (0.2, 0.2), lambda: f"{page.pose()}, not {truth}")
-    assert page.page.matcher(".place").count() == 0
+    assert page.page.locator(".place").count() == 0
 
 
 def test_a_carried_robot_is_searched_and_found(page: Visit) -> None:
@@ -226,10 +226,10 @@ def held_stamp(page: Visit, server: Server) -> float | None:
 
 
 def test_people_come_and_go(page: Visit) -> None:
-    slider = page.page.matcher("#people")
+    slider = page.page.locator("#people")
     slider.fill("12")
     assert page.page.inner_text("#people-count") == "12"
-    short = page.page.matcher("#legend .short b")
+    short = page.page.locator("#legend .short b")
     wait_until(lambda: short.inner_text() not in {"0%", "–"}, lambda: "somebody is seen")
     page.page.click("#add-person")
     assert page.page.inner_text("#people-count") == "13"
@@ -243,7 +243,7 @@ def test_what_is_shown_can_be_chosen(visit: Visitor, office_server: Server, devi
     page.wait_for_fix()
     if device is PHONE:
         page.page.tap("#sheet-handle")
-    for chip in page.page.matcher(".chip").all():
+    for chip in page.page.locator(".chip").all():
         chip.click()
         assert chip.get_attribute("aria-pressed") == "false"
     page.page.wait_for_timeout(200)

@@ -79,7 +79,7 @@ def test_escape_leaves_a_mode_and_nothing_is_sent(page: Visit) -> None:
 
 
 def test_every_control_is_reached_by_tab_and_shows_it(page: Visit) -> None:
-    controls = page.page.matcher("#app :is(button, input, canvas[tabindex]):visible").count()
+    controls = page.page.locator("#app :is(button, input, canvas[tabindex]):visible").count()
     reached = set()
     for _ in range(controls + 6):
         page.page.keyboard.press("Tab")
@@ -89,7 +89,7 @@ def test_every_control_is_reached_by_tab_and_shows_it(page: Visit) -> None:
         outline = page.page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
         on_page = page.page.evaluate("document.activeElement !== document.body")
         assert not on_page or outline != "none"
-    for control in page.page.matcher("#app :is(button, input, canvas[tabindex]):visible").all():
+    for control in page.page.locator("#app :is(button, input, canvas[tabindex]):visible").all():
         name = control.evaluate("(element) => element.id || element.outerHTML")
         assert name in reached
 
@@ -103,7 +103,7 @@ def test_a_button_with_the_focus_has_its_space_bar(page: Visit) -> None:
 
 
 def test_what_happens_is_spoken(page: Visit) -> None:
-    spoken = page.page.matcher("#spoken")
+    spoken = page.page.locator("#spoken")
     assert spoken.get_attribute("aria-live") == "polite"
     wait_until(lambda: "localized" in spoken.inner_text().lower(), spoken.inner_text)
     page.page.keyboard.press("c")
@@ -123,7 +123,7 @@ def test_the_help_lists_the_keys(page: Visit) -> None:
     page.page.keyboard.press("?")
     assert page.page.is_visible("#help-dialog")
     for key in ("F", "P", "G", "C", "R", "Space", "Esc"):
-        assert page.page.matcher(f"#help-dialog kbd:text-is('{key}')").count() >= 1
+        assert page.page.locator(f"#help-dialog kbd:text-is('{key}')").count() >= 1
     page.page.keyboard.press("Escape")
     assert page.page.is_hidden("#help-dialog")
 

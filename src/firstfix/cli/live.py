@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import socket
 
     from firstfix.core.grid import OccupancyGrid
-    from firstfix.web.guard import Access
+    from firstfix.web.access_control import AccessPolicy
 
 PORT = 8642
 
@@ -47,7 +47,7 @@ class Address:
     token: str | None = None
     may_steer: bool = True
 
-    def access(self) -> Access:
+    def access(self) -> AccessPolicy:
         """Return what is asked of clients.
 
         Raises
@@ -55,7 +55,7 @@ class Address:
         InputError
             If the token is missing or too short.
         """
-        from firstfix.web.guard import Access, is_loopback
+        from firstfix.web.access_control import AccessPolicy, is_loopback
 
         inside = is_loopback(self.host)
         if self.token is None and not inside:
@@ -70,7 +70,7 @@ class Address:
                 received=f"{len(self.token)}",
                 remedy="make it longer; only programs and links need to remember it",
             )
-        return Access(self.token, may_steer=self.may_steer, loopback_only=inside)
+        return AccessPolicy(self.token, may_steer=self.may_steer, loopback_only=inside)
 
 
 class Rest(Enum):
@@ -106,26 +106,26 @@ def serve_simulated(
     from firstfix.global_localization.searchable import check_searchable
     from firstfix.lab.live.simulated_node import SimNode
     from firstfix.lab.live.steered_robot import SimRobot
-    from firstfix.web.feed import Feed
+    from firstfix.web.command_executor import CommandExecutor
     from firstfix.web.page import Page
     from firstfix.web.server import listen, make_server
-    from firstfix.web.steering import Steering
+    from firstfix.web.snapshot_store import SnapshotStore
 
     access = address.access()
     check_searchable(grid)
     with listen(address.host, address.port) as listening:
-        feed = Feed(name)
+        store = SnapshotStore(name)
 
         def complain(text: str) -> None:
             typer.echo(text, err=True)
-            feed.tell("warning", text.partition("\n")[0])
+            store.add_event("warning", text.partition("\n")[0])
 
         robot = SimRobot(grid, seed)
         if rest is Rest.SLEEPS:
             robot.pause()
-        node = SimNode(grid, robot, [feed], feed.know, complain)
-        steering = Steering(feed, node.give, robot)
-        page = Page("sim", feed, steering, access, greet=robot.go_on)
+        node = SimNode(grid, robot, [store], store.set_truth, complain)
+        executor = CommandExecutor(store, node.give, robot)
+        page = Page("sim", store, executor, access, greet=robot.go_on)
         node.start()
         _tell(listening, access)
         with suppress(KeyboardInterrupt):  # the usual end
@@ -155,18 +155,18 @@ def serve_robot(robot: str, map_path: Path, arguments: list[str], address: Addre
     from firstfix.cli.nodes import runner
     from firstfix.global_localization.searchable import check_searchable
     from firstfix.io.maps.map_server import load_map
-    from firstfix.web.background_page import PageBeside
+    from firstfix.web.background_page import BackgroundPage
     from firstfix.web.server import listen
 
     access, run = address.access(), runner(robot)
     check_searchable(load_map(map_path))  # what is wrong with it is told before anything is begun
     with listen(address.host, address.port) as listening:
         _tell(listening, access)
-        with PageBeside(robot, map_path.stem, access, listening) as page:
+        with BackgroundPage(robot, map_path.stem, access, listening) as page:
             run(f"{map_path.resolve()}", arguments, page.make_node)
 
 
-def _tell(listening: socket.socket, access: Access) -> None:
+def _tell(listening: socket.socket, access: AccessPolicy) -> None:
     """Say where the page is, and show it where somebody is there to look at it."""
     from firstfix.web.server import url_of
 

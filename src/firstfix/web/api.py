@@ -10,11 +10,11 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from firstfix.web.commands import POSE, Order, checked
-from firstfix.web.hub import Hub
+from firstfix.web.broadcaster import Broadcaster
+from firstfix.web.commands import POSE, Command, checked
 from firstfix.web.locate_queue import LocateQueue
-from firstfix.web.map_picture import LEAST_PIXELS, MOST_PIXELS, cells_per_pixel
-from firstfix.web.messages import as_text, map_object, state_object
+from firstfix.web.map_png import LEAST_PIXELS, MOST_PIXELS, cells_per_pixel
+from firstfix.web.messages import as_text, map_object, state_message
 from firstfix.web.openapi import document
 from firstfix.web.page import Page
 from firstfix.web.request_body import JSON, NPZ, body_of, kind_of
@@ -31,13 +31,13 @@ class Api:
     ----------
     page : Page
         What they are about.
-    hub : Hub
+    broadcaster : Broadcaster
         Who looks on.
     """
 
-    def __init__(self, page: Page, hub: Hub) -> None:
+    def __init__(self, page: Page, broadcaster: Broadcaster) -> None:
         self._page = page
-        self._hub = hub
+        self._broadcaster = broadcaster
         self._desk = LocateQueue()
         self._document = as_text(document())
 
@@ -55,7 +55,7 @@ class Api:
 
     async def status(self, _: Request) -> Response:
         """Say where the robot is, and why."""
-        return _json(state_object(self._page.feed.view, len(self._hub)))
+        return _json(state_message(self._page.store.snapshot, len(self._broadcaster)))
 
     async def map(self, _: Request) -> Response:
         """Describe the map."""
@@ -63,20 +63,20 @@ class Api:
 
     async def map_png(self, request: Request) -> Response:
         """Draw the map."""
-        shown, most = self._page.map(), _most_pixels(request)
-        tag = f'"{shown.key}-{cells_per_pixel(shown, most)}"'
+        active_map, most = self._page.map(), _most_pixels(request)
+        tag = f'"{active_map.key}-{cells_per_pixel(active_map, most)}"'
         headers = {"etag": tag, "cache-control": "private, no-cache"}
         if tag in request.headers.get("if-none-match", ""):
             return Response(status_code=304, headers=headers)
-        picture = await run_in_threadpool(self._page.pictures.png, shown, most)
+        picture = await run_in_threadpool(self._page.pictures.png, active_map, most)
         return Response(picture, media_type="image/png", headers=headers)
 
     async def locate(self, request: Request) -> Response:
         """Find a scan in the map."""
-        shown, kind = self._page.map(), kind_of(request, JSON, NPZ)
+        active_map, kind = self._page.map(), kind_of(request, JSON, NPZ)
         body = await body_of(request)
         named = request.query_params.get("map")
-        return _json(await self._desk.answer(body, kind, named, shown))
+        return _json(await self._desk.answer(body, kind, named, active_map))
 
     async def pose(self, request: Request) -> Response:
         """Take the word of a person."""
@@ -84,20 +84,20 @@ class Api:
         self._page.map()
         kind_of(request, JSON)
         message = parsed(await body_of(request, _POSE_BYTES))
-        return await self._obey(Order("pose", checked(POSE, message)))
+        return await self._execute(Command("pose", checked(POSE, message)))
 
     async def relocalize(self, _: Request) -> Response:
         """Forget, and search."""
         self._page.check_may_steer()
         self._page.map()
-        return await self._obey(Order("relocalize", {}))
+        return await self._execute(Command("relocalize", {}))
 
     async def openapi(self, _: Request) -> Response:
         """Describe all this."""
         return Response(self._document, media_type=JSON)
 
-    async def _obey(self, order: Order) -> Response:
-        await run_in_threadpool(self._page.steering.obey, order)
+    async def _execute(self, order: Command) -> Response:
+        await run_in_threadpool(self._page.executor.execute, order)
         return _json({"detail": "the next scan will tell; GET /v1/status says what"}, 202)
 
 

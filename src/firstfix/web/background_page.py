@@ -10,16 +10,16 @@ from firstfix.localizer.inputs import Input
 from firstfix.ros.node import Node
 from firstfix.ros.node_config import NodeConfig
 from firstfix.ros.transport import Transport
-from firstfix.web.feed import Feed
-from firstfix.web.guard import Access
+from firstfix.web.access_control import AccessPolicy
+from firstfix.web.command_executor import CommandExecutor
 from firstfix.web.page import Page
 from firstfix.web.server import make_server
-from firstfix.web.steering import Steering
+from firstfix.web.snapshot_store import SnapshotStore
 
 _END_S = 5.0
 
 
-class PageBeside:
+class BackgroundPage:
     """Serves the page while it exists as a context; `make_node` makes nodes that it shows.
 
     Parameters
@@ -28,24 +28,24 @@ class PageBeside:
         ros1, ros2 or dds.
     map_name : str
         What the map is called.
-    access : Access
+    access : AccessPolicy
         What is asked of viewers.
     listening : socket
         Where they come in.
     """
 
-    def __init__(self, robot: str, map_name: str, access: Access, listening: socket) -> None:
-        self._feed = Feed(map_name)
+    def __init__(self, robot: str, map_name: str, access: AccessPolicy, listening: socket) -> None:
+        self._store = SnapshotStore(map_name)
         self._node: Node | None = None
         self._server = make_server(
-            Page(robot, self._feed, Steering(self._feed, self._give), access)
+            Page(robot, self._store, CommandExecutor(self._store, self._give), access)
         )
         serve = {"sockets": [listening]}
         self._thread = threading.Thread(
             target=self._server.run, kwargs=serve, name="page", daemon=True
         )
 
-    def __enter__(self) -> PageBeside:
+    def __enter__(self) -> BackgroundPage:
         self._thread.start()
         return self
 
@@ -68,7 +68,7 @@ class PageBeside:
         Node
             Not started yet.
         """
-        self._node = Node(config, transport, [self._feed])
+        self._node = Node(config, transport, [self._store])
         return self._node
 
     def _give(self, given: Input) -> None:

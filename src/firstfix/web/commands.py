@@ -74,7 +74,7 @@ _YAW = Entry(float, "the heading, rad, counter-clockwise from +x")
 
 POSE = {"x": _X, "y": _Y, "yaw": _YAW}
 
-ORDERS: dict[str, dict[str, Entry]] = {
+COMMANDS: dict[str, dict[str, Entry]] = {
     "pose": POSE,
     "pick": {"index": Entry(int, "which of the hypotheses of the last state, from 0", 0, 1000)},
     "relocalize": {},
@@ -86,13 +86,13 @@ ORDERS: dict[str, dict[str, Entry]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class Command:
     """A checked message.
 
     Parameters
     ----------
     kind : str
-        A key of `ORDERS`.
+        A key of `COMMANDS`.
     given : dict
         Its entries, all of them.
     """
@@ -101,7 +101,7 @@ class Order:
     given: dict[str, Any]
 
 
-def order_of(message: Any) -> Order:
+def decode_command(message: Any) -> Command:
     """Check a message of a viewer.
 
     Parameters
@@ -111,7 +111,7 @@ def order_of(message: Any) -> Order:
 
     Returns
     -------
-    Order
+    Command
         What it asks for.
 
     Raises
@@ -120,13 +120,13 @@ def order_of(message: Any) -> Order:
         If it says nothing that is known, or not all that is needed.
     """
     kind = message.get("type") if isinstance(message, Mapping) else None
-    if not isinstance(kind, str) or kind not in ORDERS:
+    if not isinstance(kind, str) or kind not in COMMANDS:
         raise InputError(
-            expected=f"an object whose type is one of {', '.join(ORDERS)}",
+            expected=f"an object whose type is one of {', '.join(COMMANDS)}",
             received=shown(message),
             remedy="see docs/live.md",
         )
-    return Order(kind, checked(ORDERS[kind], message))
+    return Command(kind, checked(COMMANDS[kind], message))
 
 
 def checked(entries: Mapping[str, Entry], message: Any) -> dict[str, Any]:

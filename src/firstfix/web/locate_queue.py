@@ -18,8 +18,8 @@ from firstfix.io.answers import answer_document
 from firstfix.io.logs.npz import read_scan
 from firstfix.web.commands import POSE, Entry, checked
 from firstfix.web.request_body import JSON
+from firstfix.web.snapshot import ActiveMap
 from firstfix.web.strict_json import parsed, shown
-from firstfix.web.view import ShownMap
 
 SENSOR = {
     "angle_min": Entry(float, "bearing of the first beam, rad", -100.0, 100.0),
@@ -44,7 +44,7 @@ class LocateQueue:
         self._inside = 0
 
     async def answer(
-        self, body: bytes, kind: str, named: str | None, on: ShownMap
+        self, body: bytes, kind: str, named: str | None, on: ActiveMap
     ) -> dict[str, Any]:
         """Search.
 
@@ -56,7 +56,7 @@ class LocateQueue:
             Its media type.
         named : str or None
             The map that is meant, where the body cannot say it.
-        on : ShownMap
+        on : ActiveMap
             The map in use.
 
         Returns
@@ -81,7 +81,7 @@ class LocateQueue:
             self._inside -= 1
 
 
-def _answer(body: bytes, kind: str, named: str | None, on: ShownMap) -> dict[str, Any]:
+def _answer(body: bytes, kind: str, named: str | None, on: ActiveMap) -> dict[str, Any]:
     if kind == JSON:
         message = parsed(body)
         scan = _scan_of(message)

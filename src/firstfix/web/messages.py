@@ -9,9 +9,9 @@ from typing import Any
 from firstfix import __version__
 from firstfix.core.se2 import SE2
 from firstfix.io.answers import finite
-from firstfix.web.map_picture import image_of
+from firstfix.web.map_png import image_of
+from firstfix.web.snapshot import ActiveMap, Snapshot
 from firstfix.web.timeline import Event
-from firstfix.web.view import ShownMap, View
 
 
 def pose_list(pose: SE2 | None) -> list[float] | None:
@@ -19,20 +19,20 @@ def pose_list(pose: SE2 | None) -> list[float] | None:
     return None if pose is None else [pose.x, pose.y, pose.yaw]
 
 
-def map_object(shown: ShownMap) -> dict[str, Any]:
+def map_object(active_map: ActiveMap) -> dict[str, Any]:
     """Describe the map in use: name, cells, place, and where its picture is."""
-    grid = shown.grid
+    grid = active_map.grid
     return {
-        "name": shown.name,
+        "name": active_map.name,
         "width": grid.width,
         "height": grid.height,
         "resolution": grid.resolution,
         "origin": pose_list(grid.T_map_grid),
-        "image": image_of(shown),
+        "image": image_of(active_map),
     }
 
 
-def event_object(event: Event) -> dict[str, Any]:
+def event_message(event: Event) -> dict[str, Any]:
     """Describe an event."""
     return {
         "type": "event",
@@ -43,10 +43,10 @@ def event_object(event: Event) -> dict[str, Any]:
     }
 
 
-def hello_object(
+def hello_message(
     robot: str,
     abilities: tuple[str, ...],
-    shown: ShownMap | None,
+    active_map: ActiveMap | None,
     events: list[Event],
     *,
     may_steer: bool,
@@ -59,7 +59,7 @@ def hello_object(
         sim, ros1, ros2 or dds.
     abilities : tuple of str
         What the robot can be told besides where it is.
-    shown : ShownMap or None
+    active_map : ActiveMap or None
         The map.
     events : list of Event
         What has happened so far.
@@ -77,20 +77,20 @@ def hello_object(
         "robot": robot,
         "may_steer": may_steer,
         "abilities": list(abilities),
-        "map": None if shown is None else map_object(shown),
-        "events": [event_object(event) for event in events],
+        "map": None if active_map is None else map_object(active_map),
+        "events": [event_message(event) for event in events],
     }
 
 
-def state_object(view: View, viewers: int) -> dict[str, Any]:
+def state_message(snapshot: Snapshot, viewers: int) -> dict[str, Any]:
     """Describe the state, for ``viewers`` of them."""
-    covariance, evidence, motion = view.covariance, view.evidence, view.motion
+    covariance, evidence, motion = snapshot.covariance, snapshot.evidence, snapshot.motion
     return {
         "type": "state",
-        "stamp": view.stamp,
-        "state": view.state.value,
-        "reason": view.reason,
-        "pose": pose_list(view.pose),
+        "stamp": snapshot.stamp,
+        "state": snapshot.state.value,
+        "reason": snapshot.reason,
+        "pose": pose_list(snapshot.pose),
         "covariance": None
         if covariance is None
         else [float(covariance[i]) for i in ((0, 0), (0, 1), (1, 1), (2, 2))],
@@ -100,15 +100,15 @@ def state_object(view: View, viewers: int) -> dict[str, Any]:
                 "probability": place.probability,
                 "explained": place.evidence.explained,
             }
-            for place in view.hypotheses
+            for place in snapshot.hypotheses
         ],
         "evidence": None if evidence is None else asdict(evidence),
-        "particles": 0 if view.belief is None else len(view.belief.particles),
-        "cpu_ms": view.cpu_ms,
-        "time_to_fix_s": view.time_to_fix_s,
+        "particles": 0 if snapshot.particles is None else len(snapshot.particles.particles),
+        "cpu_ms": snapshot.cpu_ms,
+        "time_to_fix_s": snapshot.time_to_fix_s,
         "motion": None if motion is None else {"turn": motion.turn, "ahead": motion.ahead},
-        "truth": pose_list(view.truth),
-        "paused": view.paused,
+        "truth": pose_list(snapshot.truth),
+        "paused": snapshot.paused,
         "viewers": viewers,
     }
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from firstfix import __version__
 from firstfix.web.commands import POSE
-from firstfix.web.map_picture import LEAST_PIXELS, MOST_PIXELS
-from firstfix.web.problem import MEDIA_TYPE
+from firstfix.web.map_png import LEAST_PIXELS, MOST_PIXELS
+from firstfix.web.problem_details import MEDIA_TYPE
 from firstfix.web.request_body import JSON, NPZ
 from firstfix.web.schemas import Schema, entries, ref, schemas
 

@@ -8,13 +8,13 @@ from typing import Any
 
 from starlette.exceptions import HTTPException
 
-from firstfix.web.feed import Feed
-from firstfix.web.guard import Access
-from firstfix.web.map_picture import MapPictures
-from firstfix.web.messages import as_text, hello_object
+from firstfix.web.access_control import AccessPolicy
+from firstfix.web.command_executor import CommandExecutor
+from firstfix.web.map_png import MapPngCache
+from firstfix.web.messages import as_text, hello_message
 from firstfix.web.rate_limiter import RateLimiter
-from firstfix.web.steering import Steering
-from firstfix.web.view import ShownMap
+from firstfix.web.snapshot import ActiveMap
+from firstfix.web.snapshot_store import SnapshotStore
 
 
 def _greet_nobody() -> None:
@@ -29,40 +29,40 @@ class Page:
     ----------
     robot : str
         sim, ros1, ros2 or dds.
-    feed : Feed
+    store : SnapshotStore
         What there is to be seen.
-    steering : Steering
+    executor : CommandExecutor
         Carries out what people want.
-    access : Access
+    access : AccessPolicy
         What is asked of clients.
     greet : callable
         Called when the first viewer comes.
     allowance : RateLimiter
         How much clients may still ask for.
-    pictures : MapPictures
+    pictures : MapPngCache
         Of maps.
     """
 
     robot: str
-    feed: Feed
-    steering: Steering
-    access: Access = field(default_factory=Access)
+    store: SnapshotStore
+    executor: CommandExecutor
+    access: AccessPolicy = field(default_factory=AccessPolicy)
     greet: Callable[[], None] = _greet_nobody
     allowance: RateLimiter = field(default_factory=RateLimiter)
-    pictures: MapPictures = field(default_factory=MapPictures)
+    pictures: MapPngCache = field(default_factory=MapPngCache)
 
     def hello(self) -> str:
         """Write the message that a viewer gets first."""
-        message: dict[str, Any] = hello_object(
+        message: dict[str, Any] = hello_message(
             self.robot,
-            self.steering.abilities,
-            self.feed.view.map,
-            self.feed.events(),
+            self.executor.abilities,
+            self.store.snapshot.map,
+            self.store.events(),
             may_steer=self.access.may_steer,
         )
         return as_text(message)
 
-    def map(self) -> ShownMap:
+    def map(self) -> ActiveMap:
         """Return the map in use.
 
         Raises
@@ -70,10 +70,10 @@ class Page:
         HTTPException
             503 if there is none yet.
         """
-        shown = self.feed.view.map
-        if shown is None:
+        active_map = self.store.snapshot.map
+        if active_map is None:
             raise HTTPException(503, "there is no map yet", {"retry-after": "1"})
-        return shown
+        return active_map
 
     def check_may_steer(self) -> None:
         """Refuse those who may only watch.

@@ -20,12 +20,12 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
 from firstfix.core.errors import InputError
+from firstfix.web.access_control import AccessControl
 from firstfix.web.api import Api
-from firstfix.web.guard import Guard
-from firstfix.web.hub import Hub
-from firstfix.web.live import live
+from firstfix.web.broadcaster import Broadcaster
 from firstfix.web.page import Page
-from firstfix.web.problem import HANDLERS
+from firstfix.web.problem_details import HANDLERS
+from firstfix.web.websocket import live
 
 STATIC = Path(__file__).parent / "static"
 
@@ -53,11 +53,11 @@ def make_app(page: Page) -> ASGIApp:
     ASGI application
         For `run`, or another server.
     """
-    hub = Hub(page.feed, page.hello, page.greet)
+    broadcaster = Broadcaster(page.store, page.hello, page.greet)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        showing = asyncio.create_task(hub.run())
+        showing = asyncio.create_task(broadcaster.run())
         yield
         showing.cancel()
         with contextlib.suppress(asyncio.CancelledError):
@@ -67,16 +67,16 @@ def make_app(page: Page) -> ASGIApp:
         return FileResponse(STATIC / "index.html", headers={"cache-control": "no-cache"})
 
     async def watch(websocket: WebSocket) -> None:
-        await live(websocket, hub, page)
+        await live(websocket, broadcaster, page)
 
     routes = [
         Route("/", index),
-        *Api(page, hub).routes(),
+        *Api(page, broadcaster).routes(),
         WebSocketRoute("/v1/live", watch),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
     app = Starlette(routes=routes, lifespan=lifespan, exception_handlers=HANDLERS)
-    return Guard(app, page.access, page.allowance)
+    return AccessControl(app, page.access, page.allowance)
 
 
 def listen(host: str, port: int) -> socket.socket:

@@ -11,16 +11,16 @@ from live_lab import drive
 from firstfix.amcl.particles import equal_weights
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.beams import usable_beams
-from firstfix.web.frames import NO_RETURN, particles_frame, scan_frame
-from firstfix.web.messages import as_text, hello_object, map_object, state_object
-from firstfix.web.view import PlacedParticles, View
+from firstfix.web.binary_frames import NO_RETURN, particles_frame, scan_frame
+from firstfix.web.messages import as_text, hello_message, map_object, state_message
+from firstfix.web.snapshot import ParticleCloud, Snapshot
 
 
 @pytest.fixture(scope="module")
-def view() -> View:
+def view() -> Snapshot:
     begun = drive()
     begun.step(30)
-    return begun.feed.view
+    return begun.store.snapshot
 
 
 def opened(frame: bytes, columns: int) -> tuple[tuple, np.ndarray, bytes]:
@@ -30,12 +30,12 @@ def opened(frame: bytes, columns: int) -> tuple[tuple, np.ndarray, bytes]:
 
 
 def test_a_scan_lies_where_it_was_taken(view):
-    header, points, classes = opened(scan_frame(view.placed, view.map), 2)
-    scan = view.placed.scan
+    header, points, classes = opened(scan_frame(view.scan, view.map), 2)
+    scan = view.scan.scan
     assert header == (1, 1, 0, len(usable_beams(scan)), scan.stamp)
     assert len(classes) == header[3]
     hit = usable_beams(scan).hit
-    expected = view.placed.T_map_base.apply(scan.points())
+    expected = view.scan.T_map_base.apply(scan.points())
     np.testing.assert_allclose(points[hit], expected, atol=1e-4)
     kinds = np.frombuffer(classes, np.uint8)
     assert ((kinds == NO_RETURN) == ~hit).all()
@@ -43,9 +43,9 @@ def test_a_scan_lies_where_it_was_taken(view):
 
 
 def test_beams_without_a_return_end_where_sight_ends(view):
-    _, points, classes = opened(scan_frame(view.placed, view.map), 2)
-    scan = view.placed.scan
-    laser = view.placed.T_map_base @ scan.T_base_laser
+    _, points, classes = opened(scan_frame(view.scan, view.map), 2)
+    scan = view.scan.scan
+    laser = view.scan.T_map_base @ scan.T_base_laser
     silent = points[np.frombuffer(classes, np.uint8) == NO_RETURN]
     assert len(silent) > 0
     reach = np.hypot(silent[:, 0] - laser.x, silent[:, 1] - laser.y)
@@ -59,7 +59,7 @@ def test_nothing_is_a_header_alone():
 
 def test_particles_go_with_the_robot():
     poses = np.array([[1.0, 2.0, 0.0], [1.0, 2.0, np.pi / 2]])
-    belief = PlacedParticles(equal_weights(poses), SE2(1.0, 2.0, 0.0))
+    belief = ParticleCloud(equal_weights(poses), SE2(1.0, 2.0, 0.0))
     header, values, rest = opened(particles_frame(belief, SE2(1.0, 2.0, 0.0), 7.0), 3)
     assert (header, rest) == ((2, 1, 0, 2, 7.0), b"")
     np.testing.assert_allclose(values, poses, atol=1e-6)
@@ -70,7 +70,7 @@ def test_particles_go_with_the_robot():
 
 
 def test_the_words_are_json_without_nan(view):
-    state = state_object(view, 3)
+    state = state_message(view, 3)
     assert state["viewers"] == 3
     assert state["covariance"] == pytest.approx(
         [float(view.covariance[i]) for i in ((0, 0), (0, 1), (1, 1), (2, 2))]
@@ -80,7 +80,7 @@ def test_the_words_are_json_without_nan(view):
 
 
 def test_hello_says_who_may_do_what(view):
-    hello = hello_object("sim", ("goal",), view.map, [], may_steer=False)
+    hello = hello_message("sim", ("goal",), view.map, [], may_steer=False)
     assert hello["map"] == map_object(view.map)
     assert (hello["may_steer"], hello["abilities"]) == (False, ["goal"])
-    assert hello_object("dds", (), None, [], may_steer=True)["map"] is None
+    assert hello_message("dds", (), None, [], may_steer=True)["map"] is None

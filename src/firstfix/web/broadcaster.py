@@ -8,11 +8,11 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 
-from firstfix.web.feed import Feed
-from firstfix.web.frames import particles_frame, scan_frame
-from firstfix.web.messages import as_text, event_object, state_object
+from firstfix.web.binary_frames import particles_frame, scan_frame
+from firstfix.web.messages import as_text, event_message, state_message
+from firstfix.web.snapshot import Snapshot
+from firstfix.web.snapshot_store import SnapshotStore
 from firstfix.web.timeline import MOST_EVENTS
-from firstfix.web.view import View
 
 # Viewers see what a robot of 20 Hz says at once: a little less than its period.
 PERIOD_S = 0.045
@@ -56,12 +56,12 @@ class Viewer:
         return frames
 
 
-class Hub:
+class Broadcaster:
     """All viewers, and the task that shows them what is new.
 
     Parameters
     ----------
-    feed : Feed
+    store : SnapshotStore
         What there is to be seen.
     hello : callable
         Describes the robot and a map to a viewer.
@@ -69,14 +69,16 @@ class Hub:
         Called when the first viewer comes.
     """
 
-    def __init__(self, feed: Feed, hello: Callable[[], str], greet: Callable[[], None]) -> None:
-        self._feed = feed
+    def __init__(
+        self, store: SnapshotStore, hello: Callable[[], str], greet: Callable[[], None]
+    ) -> None:
+        self._store = store
         self._hello = hello
         self._greet = greet
         self._is_greeted = False
         self._viewers: set[Viewer] = set()
         self._changed = asyncio.Event()
-        self._shown = View()
+        self._shown = Snapshot()
         self._next_event = 0
 
     def __len__(self) -> int:
@@ -90,7 +92,7 @@ class Hub:
             with suppress(RuntimeError):  # the server has just ended
                 loop.call_soon_threadsafe(self._changed.set)
 
-        self._feed.listen(wake)
+        self._store.subscribe(wake)
         try:
             while True:
                 await self._changed.wait()
@@ -99,7 +101,7 @@ class Hub:
                     self._try_to_show_news()
                 await asyncio.sleep(PERIOD_S)
         finally:
-            self._feed.hang_up(wake)
+            self._store.unsubscribe(wake)
 
     def join(self) -> Viewer | None:
         """Let a viewer in, and show all that there is; None if there are too many already."""
@@ -129,27 +131,31 @@ class Hub:
             _log.exception("what there is to be seen could not be shown")
 
     def _show_news(self) -> None:
-        before, view = self._shown, self._feed.view
-        self._shown = view
-        if view.map is not before.map:
+        before, snapshot = self._shown, self._store.snapshot
+        self._shown = snapshot
+        if snapshot.map is not before.map:
             self._show("hello", self._hello())
-        for event in self._feed.events(self._next_event):
+        for event in self._store.events(self._next_event):
             self._next_event = event.number + 1
-            text = as_text(event_object(event))
+            text = as_text(event_message(event))
             for viewer in self._viewers:
                 viewer.tell(text)
-        for kind, frame in self._frames(view, before).items():
+        for kind, frame in self._frames(snapshot, before).items():
             self._show(kind, frame)
 
     def _show(self, kind: str, frame: Frame) -> None:
         for viewer in self._viewers:
             viewer.show(kind, frame)
 
-    def _frames(self, view: View, before: View | None) -> dict[str, Frame]:
-        """Make the frames that differ from those of a view before; all if there was none."""
-        frames: dict[str, Frame] = {"state": as_text(state_object(view, len(self)))}
-        if before is None or before.placed is not view.placed:
-            frames["scan"] = scan_frame(view.placed, view.map)
-        if before is None or before.belief is not view.belief or before.pose != view.pose:
-            frames["particles"] = particles_frame(view.belief, view.pose, view.stamp)
+    def _frames(self, snapshot: Snapshot, before: Snapshot | None) -> dict[str, Frame]:
+        """Make the frames that differ from those of a snapshot before; all if there was none."""
+        frames: dict[str, Frame] = {"state": as_text(state_message(snapshot, len(self)))}
+        if before is None or before.scan is not snapshot.scan:
+            frames["scan"] = scan_frame(snapshot.scan, snapshot.map)
+        if (
+            before is None
+            or before.particles is not snapshot.particles
+            or before.pose != snapshot.pose
+        ):
+            frames["particles"] = particles_frame(snapshot.particles, snapshot.pose, snapshot.stamp)
         return frames

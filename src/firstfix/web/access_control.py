@@ -11,7 +11,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from firstfix.web.problem import problem
+from firstfix.web.problem_details import problem
 from firstfix.web.rate_limiter import WRONG_TOKEN, RateLimiter
 
 HARDENING = {
@@ -29,7 +29,7 @@ _READING = {"GET", "HEAD"}
 
 
 @dataclass(frozen=True, slots=True)
-class Access:
+class AccessPolicy:
     """What is asked of clients.
 
     Parameters
@@ -51,20 +51,20 @@ class Access:
         return self.token is None or hmac.compare_digest(_as_bytes(token), _as_bytes(self.token))
 
 
-class Guard:
+class AccessControl:
     """Refuses strangers, and hardens what goes out.
 
     Parameters
     ----------
     app : ASGI application
         What is guarded.
-    access : Access
+    access : AccessPolicy
         What is asked of clients.
     allowance : RateLimiter
         How much they may ask for.
     """
 
-    def __init__(self, app: ASGIApp, access: Access, allowance: RateLimiter) -> None:
+    def __init__(self, app: ASGIApp, access: AccessPolicy, allowance: RateLimiter) -> None:
         self._app = app
         self._access = access
         self._allowance = allowance

@@ -8,13 +8,13 @@ from typing import Protocol
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.localizer.inputs import Input, PoseHint, Reset
-from firstfix.web.commands import Order
-from firstfix.web.feed import Feed
+from firstfix.web.commands import Command
+from firstfix.web.snapshot_store import SnapshotStore
 
 ABILITIES = ("goal", "carry", "people", "pause")
 
 
-class SteerableRobot(Protocol):
+class ControllableRobot(Protocol):
     """A simulated robot that viewers of the page can move."""
 
     def pause(self) -> None:
@@ -33,23 +33,26 @@ class SteerableRobot(Protocol):
         """Let people walk around the robot."""
 
 
-class Steering:
+class CommandExecutor:
     """Tells the localizer, and the simulated robot if there is one, what people want.
 
     Parameters
     ----------
-    feed : Feed
+    store : SnapshotStore
         Knows the time and the hypotheses.
     give : callable
         Hands an input to the localizer; from any thread.
-    robot : SteerableRobot or None
+    robot : ControllableRobot or None
         Who can be sent about.
     """
 
     def __init__(
-        self, feed: Feed, give: Callable[[Input], None], robot: SteerableRobot | None = None
+        self,
+        store: SnapshotStore,
+        give: Callable[[Input], None],
+        robot: ControllableRobot | None = None,
     ) -> None:
-        self._feed = feed
+        self._store = store
         self._give = give
         self._robot = robot
 
@@ -58,7 +61,7 @@ class Steering:
         """Which orders can be carried out besides those that every robot can."""
         return () if self._robot is None else ABILITIES
 
-    def obey(self, order: Order) -> None:
+    def execute(self, order: Command) -> None:
         """Carry out an order; may take as long as planning a way.
 
         Raises
@@ -72,8 +75,8 @@ class Steering:
         elif order.kind == "pick":
             self._hint(self._hypothesis(given["index"]))
         elif order.kind == "relocalize":
-            self._feed.tell("person", "asked to search anew")
-            self._give(Reset(self._feed.view.stamp))
+            self._store.add_event("person", "asked to search anew")
+            self._give(Reset(self._store.snapshot.stamp))
         elif self._robot is None:
             raise InputError(
                 expected="a simulated robot",
@@ -84,10 +87,10 @@ class Steering:
             self._steer(self._robot, order)
 
     def _hint(self, T_map_base: SE2) -> None:
-        self._give(PoseHint(self._feed.view.stamp, T_map_base))
+        self._give(PoseHint(self._store.snapshot.stamp, T_map_base))
 
     def _hypothesis(self, index: int) -> SE2:
-        places = self._feed.view.hypotheses
+        places = self._store.snapshot.hypotheses
         if index >= len(places):
             raise InputError(
                 expected=f"one of {len(places)} hypotheses",
@@ -96,18 +99,18 @@ class Steering:
             )
         return places[index].pose
 
-    def _steer(self, robot: SteerableRobot, order: Order) -> None:
+    def _steer(self, robot: ControllableRobot, order: Command) -> None:
         given = order.given
         if order.kind == "pause":
             (robot.pause if given["paused"] else robot.go_on)()
-            self._feed.stand_still(paused=given["paused"])
-            self._feed.tell("person", "pause" if given["paused"] else "go on")
+            self._store.set_paused(paused=given["paused"])
+            self._store.add_event("person", "pause" if given["paused"] else "go on")
         elif order.kind == "goal":
             robot.drive_to(given["x"], given["y"])
-            self._feed.tell("person", f"sent to ({given['x']:.2f}, {given['y']:.2f}) m")
+            self._store.add_event("person", f"sent to ({given['x']:.2f}, {given['y']:.2f}) m")
         elif order.kind == "carry":
             robot.carry_to(SE2(**given))
-            self._feed.tell("person", f"carried to ({given['x']:.2f}, {given['y']:.2f}) m")
+            self._store.add_event("person", f"carried to ({given['x']:.2f}, {given['y']:.2f}) m")
         else:
             robot.meet(given["count"])
-            self._feed.tell("person", f"{given['count']} people around the robot")
+            self._store.add_event("person", f"{given['count']} people around the robot")

@@ -11,19 +11,19 @@ from PIL import Image
 
 from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.web.map_picture import MOST_PIXELS, MapPictures, image_of
-from firstfix.web.view import ShownMap
+from firstfix.web.map_png import MOST_PIXELS, MapPngCache, image_of
+from firstfix.web.snapshot import ActiveMap
 
 WALL, DARK, LIGHT = 40, 205, 255
 
 
-def shown(cells: np.ndarray, resolution: float = 0.05) -> ShownMap:
+def shown(cells: np.ndarray, resolution: float = 0.05) -> ActiveMap:
     grid = OccupancyGrid(cells.astype(np.int8), resolution, SE2(-1.0, -2.0, 0.3))
-    return ShownMap("test", f"{id(cells)}", grid, SimpleNamespace())
+    return ActiveMap("test", f"{id(cells)}", grid, SimpleNamespace())
 
 
-def picture(of: ShownMap, most: int = MOST_PIXELS) -> np.ndarray:
-    image = Image.open(io.BytesIO(MapPictures().png(of, most)))
+def picture(of: ActiveMap, most: int = MOST_PIXELS) -> np.ndarray:
+    image = Image.open(io.BytesIO(MapPngCache().png(of, most)))
     assert image.mode == "L"
     return np.asarray(image)
 
@@ -74,7 +74,7 @@ def test_a_large_map_is_scaled_to_what_a_browser_can_draw():
 
 
 def test_a_picture_is_drawn_once():
-    pictures, of = MapPictures(), shown(np.full((100, 100), FREE))
+    pictures, of = MapPngCache(), shown(np.full((100, 100), FREE))
     assert pictures.png(of) is pictures.png(of)
     for side in range(64, 90):
         pictures.png(of, side)

@@ -12,7 +12,7 @@ from live_lab import Site, fed
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from firstfix.web.guard import HARDENING, Access, is_loopback
+from firstfix.web.access_control import HARDENING, AccessPolicy, is_loopback
 from firstfix.web.server import listen, url_of
 
 TOKEN = "open-sesame"  # noqa: S105 - of a test
@@ -29,7 +29,7 @@ def site():
 @pytest.fixture
 def locked():
     # One for each test: who asks with wrong tokens is soon kept waiting.
-    with fed(Access(TOKEN)) as site:
+    with fed(AccessPolicy(TOKEN)) as site:
         yield site
 
 
@@ -84,7 +84,7 @@ def test_other_names_are_not(site: Site, host: str):
 
 
 def test_other_names_are_answered_where_others_may_come_and_know_the_token():
-    with fed(Access(TOKEN, loopback_only=False)) as site:
+    with fed(AccessPolicy(TOKEN, loopback_only=False)) as site:
         host = {"Host": "robot.example"}
         assert raw(site, "GET", "/v1/status", host)[0] == 401
         assert raw(site, "GET", "/v1/status", host | {"Authorization": f"Bearer {TOKEN}"})[0] == 200
@@ -137,7 +137,7 @@ def test_another_token_does_not(locked: Site, header: str):
 
 
 def test_who_guesses_is_kept_waiting():
-    with fed(Access(TOKEN)) as site, httpx.Client() as client:
+    with fed(AccessPolicy(TOKEN)) as site, httpx.Client() as client:
         answers = [client.get(site.url + "v1/status").status_code for _ in range(30)]
         assert answers[0] == 401
         assert 429 in answers
@@ -200,6 +200,6 @@ def test_the_url_of_all_addresses_names_the_machine():
 
 
 def test_a_right_token_is_known_whatever_its_letters():
-    assert Access("naïve-☃-token").knows("naïve-☃-token")
-    assert not Access("naïve-☃-token").knows("naive-☃-token")
-    assert not Access("token").knows("token\udcff")
+    assert AccessPolicy("naïve-☃-token").knows("naïve-☃-token")
+    assert not AccessPolicy("naïve-☃-token").knows("naive-☃-token")
+    assert not AccessPolicy("token").knows("token\udcff")

@@ -8,9 +8,9 @@ from contextlib import suppress
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from firstfix.core.errors import InputError
-from firstfix.web.commands import order_of
-from firstfix.web.guard import Access, client_of
-from firstfix.web.hub import Hub, Viewer
+from firstfix.web.access_control import AccessPolicy, client_of
+from firstfix.web.broadcaster import Broadcaster, Viewer
+from firstfix.web.commands import decode_command
 from firstfix.web.page import Page
 from firstfix.web.rate_limiter import WRONG_TOKEN, RateLimiter
 from firstfix.web.strict_json import parsed
@@ -25,14 +25,14 @@ _ORDERS_HZ = 30.0
 _ORDERS_AT_ONCE = 60.0
 
 
-async def live(socket: WebSocket, hub: Hub, page: Page) -> None:
+async def live(socket: WebSocket, broadcaster: Broadcaster, page: Page) -> None:
     """Serve a viewer until it goes.
 
     Parameters
     ----------
     socket : WebSocket
         Of the viewer.
-    hub : Hub
+    broadcaster : Broadcaster
         Who else looks on.
     page : Page
         What there is to be seen, and who may see it.
@@ -42,7 +42,7 @@ async def live(socket: WebSocket, hub: Hub, page: Page) -> None:
         page.allowance.charge(client_of(socket.scope), WRONG_TOKEN)
         await socket.close(_NO_TOKEN, "a token is needed")
         return
-    viewer = hub.join()
+    viewer = broadcaster.join()
     if viewer is None:
         await socket.close(_TOO_MANY, "too many viewers")
         return
@@ -50,13 +50,13 @@ async def live(socket: WebSocket, hub: Hub, page: Page) -> None:
     try:
         await _take_orders(socket, viewer, page)
     finally:
-        hub.leave(viewer)
+        broadcaster.leave(viewer)
         sending.cancel()
         with suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
             await sending
 
 
-async def _knows_token(socket: WebSocket, access: Access) -> bool:
+async def _knows_token(socket: WebSocket, access: AccessPolicy) -> bool:
     if access.token is None:
         return True
     try:
@@ -88,15 +88,15 @@ async def _take_orders(socket: WebSocket, viewer: Viewer, page: Page) -> None:
 
 async def _take_order(text: str, viewer: Viewer, page: Page) -> None:
     try:
-        await _obey(parsed(text), page)
+        await _execute(parsed(text), page)
     except InputError as error:
         viewer.refuse(str(error))
 
 
-async def _obey(message: object, page: Page) -> None:
+async def _execute(message: object, page: Page) -> None:
     if isinstance(message, dict) and message.get("type") == "token":
         return  # welcome, though none is needed
-    order = order_of(message)
+    order = decode_command(message)
     if not page.access.may_steer:
         raise InputError(
             expected="viewers who watch",
@@ -104,7 +104,7 @@ async def _obey(message: object, page: Page) -> None:
             remedy="start firstfix without --read-only",
         )
     # Planning a way through a large building takes a while.
-    await asyncio.to_thread(page.steering.obey, order)
+    await asyncio.to_thread(page.executor.execute, order)
 
 
 async def _next_text(socket: WebSocket) -> str | None:

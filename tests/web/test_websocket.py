@@ -22,8 +22,8 @@ from websockets.sync.client import connect as connect_sync
 
 from firstfix.lab.worlds.catalog import WORLDS
 from firstfix.localizer.inputs import NewMap, PoseHint, Reset
-from firstfix.web.guard import Access
-from firstfix.web.hub import MOST_VIEWERS, Hub, Viewer
+from firstfix.web.access_control import AccessPolicy
+from firstfix.web.broadcaster import MOST_VIEWERS, Broadcaster, Viewer
 from firstfix.web.timeline import MOST_EVENTS
 
 ASLEEP = 20
@@ -42,7 +42,7 @@ def office() -> Drive:
 
 @pytest.fixture
 def site(office: Drive):
-    with fed(feed=office.feed) as site:
+    with fed(store=office.store) as site:
         yield site
 
 
@@ -81,7 +81,7 @@ def test_what_happens_is_seen_by_all_at_once(site: Site, office: Drive):
     with connect(site.live) as one, connect(site.live) as other:
         until(lambda: next_of(one, "state")["viewers"] == 2)
         office.step(25)
-        last = office.feed.view
+        last = office.store.snapshot
         for viewer in (one, other):
             until(lambda viewer=viewer: next_of(viewer, "state")["stamp"] == last.stamp)
     with connect(site.live) as again:
@@ -92,7 +92,7 @@ def test_events_reach_everybody_in_their_order(site: Site, office: Drive):
     with connect(site.live) as viewer:
         number = next_of(viewer, "hello")["events"][-1]["number"]
         for i in range(5):
-            office.feed.tell("person", f"word {i}")
+            office.store.add_event("person", f"word {i}")
         heard = [next_of(viewer, "event") for _ in range(5)]
         assert [event["text"] for event in heard] == [f"word {i}" for i in range(5)]
         assert [event["number"] for event in heard] == [*range(number + 1, number + 6)]
@@ -100,7 +100,7 @@ def test_events_reach_everybody_in_their_order(site: Site, office: Drive):
 
 def test_a_new_map_greets_everybody_again(office: Drive):
     fresh = drive("office")
-    with fed(feed=fresh.feed) as site, connect(site.live) as viewer:
+    with fed(store=fresh.store) as site, connect(site.live) as viewer:
         old = next_of(viewer, "hello")["map"]
         fresh.give(NewMap(1.0, WORLDS["house"]()))
         new = next_of(viewer, "hello")["map"]
@@ -125,7 +125,7 @@ def test_orders_reach_the_localizer(site: Site, office: Drive):
     assert isinstance(hint, PoseHint)
     assert (hint.T_map_base.x, hint.T_map_base.y, hint.T_map_base.yaw) == (1.5, 2.5, 0.5)
     assert isinstance(reset, Reset)
-    assert hint.stamp == reset.stamp == office.feed.view.stamp
+    assert hint.stamp == reset.stamp == office.store.snapshot.stamp
 
 
 @pytest.mark.parametrize(
@@ -144,14 +144,14 @@ def test_what_cannot_be_done_is_told_to_who_asked(site: Site, order: str | bytes
     with connect(site.live) as viewer, connect(site.live) as other:
         viewer.send(order)
         assert words in next_of(viewer, "error")["detail"]
-        site.feed.tell("person", "and on it goes")
+        site.store.add_event("person", "and on it goes")
         while kind_of(message := other.recv(PATIENCE_S)) != "event":
             assert kind_of(message) != "error"
     assert site.given == []
 
 
 def test_who_may_only_watch_is_told_so(office: Drive):
-    with fed(Access(may_steer=False), office.feed) as site, connect(site.live) as viewer:
+    with fed(AccessPolicy(may_steer=False), office.store) as site, connect(site.live) as viewer:
         assert next_of(viewer, "hello")["may_steer"] is False
         viewer.send('{"type": "relocalize"}')
         assert "--read-only" in next_of(viewer, "error")["detail"]
@@ -190,7 +190,7 @@ TOKEN = "open-sesame"  # noqa: S105 - of a test
 
 
 def test_the_right_token_opens(office: Drive):
-    with fed(Access(TOKEN), office.feed) as site, connect(site.live) as viewer:
+    with fed(AccessPolicy(TOKEN), office.store) as site, connect(site.live) as viewer:
         viewer.send(json.dumps({"type": "token", "token": TOKEN}))
         assert kind_of(viewer.recv(PATIENCE_S)) == "hello"
 
@@ -199,7 +199,7 @@ def test_the_right_token_opens(office: Drive):
     "first", ['{"type": "token", "token": "wrong"}', '{"token": 7}', "[]", "", "{", b"\xff"]
 )
 def test_a_wrong_token_closes_and_nothing_is_seen(office: Drive, first: str | bytes):
-    with fed(Access(TOKEN), office.feed) as site, connect(site.live) as viewer:
+    with fed(AccessPolicy(TOKEN), office.store) as site, connect(site.live) as viewer:
         viewer.send(first)
         with pytest.raises(ConnectionClosed) as ended:
             viewer.recv(PATIENCE_S)
@@ -207,7 +207,7 @@ def test_a_wrong_token_closes_and_nothing_is_seen(office: Drive, first: str | by
 
 
 def test_who_guesses_here_is_kept_waiting_too(office: Drive):
-    with fed(Access(TOKEN), office.feed) as site:
+    with fed(AccessPolicy(TOKEN), office.store) as site:
 
         def guess(word: str) -> None:
             with connect(site.live) as viewer:
@@ -224,8 +224,8 @@ def test_who_guesses_here_is_kept_waiting_too(office: Drive):
 
 
 def test_without_a_token_nothing_is_seen(office: Drive, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("firstfix.web.live._TOKEN_S", 0.1)
-    with fed(Access(TOKEN), office.feed) as site, connect(site.live) as viewer:
+    monkeypatch.setattr("firstfix.web.websocket._TOKEN_S", 0.1)
+    with fed(AccessPolicy(TOKEN), office.store) as site, connect(site.live) as viewer:
         with pytest.raises(ConnectionClosed) as ended:
             viewer.recv(PATIENCE_S)
         assert ended.value.rcvd.code == 4401
@@ -240,8 +240,8 @@ def test_a_viewer_that_does_not_read_keeps_nobody_waiting():
     """Frames for it are dropped; what it gets when it reads again is new."""
     office = drive("office")
     office.step(ASLEEP + 1)
-    view = office.feed.view
-    with fed(feed=office.feed) as site, reached(site) as deaf:
+    view = office.store.snapshot
+    with fed(store=office.store) as site, reached(site) as deaf:
         deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 32 * 1024)
         deaf.sendall(
             b"GET /v1/live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\n"
@@ -251,8 +251,8 @@ def test_a_viewer_that_does_not_read_keeps_nobody_waiting():
         with connect(site.live) as viewer:
             until(lambda: next_of(viewer, "state")["viewers"] == 2)
             for i in range(30):  # 30 kB each: far more than the buffers between them hold
-                office.feed._view = replace(view, stamp=1000.0 + i, placed=replace(view.placed))
-                office.feed.tell("person", f"{i}")
+                office.store._snapshot = replace(view, stamp=1000.0 + i, scan=replace(view.scan))
+                office.store.add_event("person", f"{i}")
                 until(lambda i=i: next_of(viewer, "state")["stamp"] == 1000.0 + i)
         deaf.settimeout(PATIENCE_S)
         received = 0
@@ -294,12 +294,12 @@ def test_twenty_viewers_see_the_same(site: Site, office: Drive):
     async def all_of_them(last: float) -> list[list[bytes]]:
         watching = [asyncio.create_task(watch(last)) for _ in range(20)]
         while not all(task.done() for task in watching):
-            if office.feed.view.stamp < last:
+            if office.store.snapshot.stamp < last:
                 await asyncio.to_thread(office.step)
             await asyncio.sleep(0.02)
         return [task.result() for task in watching]
 
-    last = office.feed.view.stamp + 3.0
+    last = office.store.snapshot.stamp + 3.0
     seen = asyncio.run(asyncio.wait_for(all_of_them(last), 60.0))
     assert len(seen) == 20
     common = set(seen[0]).intersection(*seen[1:])
@@ -309,17 +309,19 @@ def test_twenty_viewers_see_the_same(site: Site, office: Drive):
 
 def test_frames_are_made_once_for_all_and_not_at_all_for_nobody(monkeypatch: pytest.MonkeyPatch):
     made = []
-    monkeypatch.setattr("firstfix.web.hub.scan_frame", lambda *_: made.append(1) or b"\x01" * 16)
+    monkeypatch.setattr(
+        "firstfix.web.broadcaster.scan_frame", lambda *_: made.append(1) or b"\x01" * 16
+    )
     begun = drive("house")
-    hub = Hub(begun.feed, lambda: "hello", lambda: None)
+    broadcaster = Broadcaster(begun.store, lambda: "hello", lambda: None)
 
     async def story() -> None:
-        running = asyncio.create_task(hub.run())
+        running = asyncio.create_task(broadcaster.run())
         await asyncio.sleep(0.01)
         begun.step(ASLEEP + 5)
         await asyncio.sleep(0.2)
         assert made == []
-        viewers = [hub.join() for _ in range(5)]
+        viewers = [broadcaster.join() for _ in range(5)]
         made.clear()
         begun.step()
         await asyncio.sleep(0.2)
@@ -333,17 +335,20 @@ def test_frames_are_made_once_for_all_and_not_at_all_for_nobody(monkeypatch: pyt
 
 def test_an_error_of_ours_does_not_end_the_show(caplog: pytest.LogCaptureFixture):
     begun = drive("house")
-    hub = Hub(begun.feed, lambda: "hello", lambda: None)
+    broadcaster = Broadcaster(begun.store, lambda: "hello", lambda: None)
 
     async def story() -> None:
-        running = asyncio.create_task(hub.run())
-        viewer = hub.join()
+        running = asyncio.create_task(broadcaster.run())
+        viewer = broadcaster.join()
         await viewer.next()
-        right, begun.feed._view = begun.feed._view, replace(begun.feed.view, evidence=object())
-        begun.feed.tell("person", "something odd")
+        right, begun.store._snapshot = (
+            begun.store._snapshot,
+            replace(begun.store.snapshot, evidence=object()),
+        )
+        begun.store.add_event("person", "something odd")
         await asyncio.sleep(0.1)
-        begun.feed._view = right
-        begun.feed.tell("person", "all well")
+        begun.store._snapshot = right
+        begun.store.add_event("person", "all well")
         await asyncio.sleep(0.2)
         assert any("all well" in text for text in await viewer.next())
         running.cancel()
@@ -357,9 +362,9 @@ def test_the_first_viewer_is_greeted_once():
     begun = drive("house")
 
     async def story() -> None:
-        hub = Hub(begun.feed, lambda: "hello", lambda: greeted.append(1))
-        hub.leave(hub.join())
-        hub.leave(hub.join())
+        broadcaster = Broadcaster(begun.store, lambda: "hello", lambda: greeted.append(1))
+        broadcaster.leave(broadcaster.join())
+        broadcaster.leave(broadcaster.join())
 
     asyncio.run(story())
     assert greeted == [1]
@@ -367,14 +372,14 @@ def test_the_first_viewer_is_greeted_once():
 
 def test_the_end_of_the_server_is_told_and_another_one_goes_on(office: Drive):
     with ExitStack() as server:
-        site = server.enter_context(fed(feed=office.feed))
+        site = server.enter_context(fed(store=office.store))
         with connect(site.live) as viewer:
             assert next_of(viewer, "hello")
             server.close()
             with pytest.raises(ConnectionClosed) as ended:
                 until(lambda: viewer.recv(PATIENCE_S) is None)
             assert ended.value.rcvd.code == 1012
-    with fed(feed=office.feed) as site, connect(site.live) as viewer:
+    with fed(store=office.store) as site, connect(site.live) as viewer:
         assert next_of(viewer, "hello")["events"]
 
 
@@ -393,9 +398,9 @@ def test_a_story_with_a_simulated_robot():
 
         other.send('{"type": "pause", "paused": true}')
         until(lambda: next_of(one, "state")["paused"])
-        stamp = site.feed.view.stamp
+        stamp = site.store.snapshot.stamp
         time.sleep(0.3)
-        assert site.feed.view.stamp <= stamp + 0.1
+        assert site.store.snapshot.stamp <= stamp + 0.1
         other.send('{"type": "pause", "paused": false}')
         until(lambda: not next_of(one, "state")["paused"])
 

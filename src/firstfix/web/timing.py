@@ -14,7 +14,7 @@ from firstfix.localizer.states import State
 _SCANS = 50
 
 
-class Meters:
+class TimingStatistics:
     """Measures the thread that calls it, between one input and the next."""
 
     def __init__(self) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.beams import usable_beams
 from firstfix.global_localization.scoring import classify_beams
-from firstfix.web.view import PlacedParticles, PlacedScan, ShownMap
+from firstfix.web.snapshot import ActiveMap, ParticleCloud, RegisteredScan
 
 VERSION = 1
 SCAN, PARTICLES = 1, 2
@@ -18,14 +18,14 @@ NO_RETURN = 4
 _HEADER = struct.Struct("<BBHId")
 
 
-def scan_frame(placed: PlacedScan | None, on: ShownMap | None) -> bytes:
+def scan_frame(placed: RegisteredScan | None, on: ActiveMap | None) -> bytes:
     """Write a scan where it was taken, each beam with what the map says to it.
 
     Parameters
     ----------
-    placed : PlacedScan or None
+    placed : RegisteredScan or None
         The scan; None for nothing to be seen.
-    on : ShownMap or None
+    on : ActiveMap or None
         The map.
 
     Returns
@@ -48,12 +48,12 @@ def scan_frame(placed: PlacedScan | None, on: ShownMap | None) -> bytes:
     return header + points.tobytes() + classes.tobytes()
 
 
-def particles_frame(belief: PlacedParticles | None, pose: SE2 | None, stamp: float) -> bytes:
+def particles_frame(belief: ParticleCloud | None, pose: SE2 | None, stamp: float) -> bytes:
     """Write particles.
 
     Parameters
     ----------
-    belief : PlacedParticles or None
+    belief : ParticleCloud or None
         The particles; None for none.
     pose : SE2 or None
         Where the robot is by now: particles stay behind until they are used again, and are shown

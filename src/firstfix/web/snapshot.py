@@ -18,7 +18,7 @@ from firstfix.localizer.states import State
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class ShownMap:
+class ActiveMap:
     """The map in use.
 
     Parameters
@@ -40,7 +40,7 @@ class ShownMap:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class PlacedScan:
+class RegisteredScan:
     """A scan where it was believed to be taken."""
 
     scan: LaserScan
@@ -48,7 +48,7 @@ class PlacedScan:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class PlacedParticles:
+class ParticleCloud:
     """A belief, and the pose that was taken from it when it was new."""
 
     particles: Particles
@@ -56,12 +56,12 @@ class PlacedParticles:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class View:
+class Snapshot:
     """All that changes from scan to scan; frozen, so that any thread may read it.
 
     Parameters
     ----------
-    map : ShownMap or None
+    map : ActiveMap or None
         The map in use.
     stamp : float
         Time of the newest input that led to something, s.
@@ -79,9 +79,9 @@ class View:
         How the scan agrees with the map.
     motion : MotionRequest or None
         What would decide between the hypotheses.
-    placed : PlacedScan or None
+    scan : RegisteredScan or None
         The newest scan that was believed to be somewhere.
-    belief : PlacedParticles or None
+    particles : ParticleCloud or None
         The particles.
     cpu_ms : float or None
         Processor time for a scan, median of the last ones, ms.
@@ -93,7 +93,7 @@ class View:
         True while its clock stands still.
     """
 
-    map: ShownMap | None = None
+    map: ActiveMap | None = None
     stamp: float = 0.0
     state: State = State.NO_MAP
     reason: str = "no map yet"
@@ -102,8 +102,8 @@ class View:
     hypotheses: tuple[Hypothesis, ...] = ()
     evidence: Evidence | None = None
     motion: MotionRequest | None = None
-    placed: PlacedScan | None = None
-    belief: PlacedParticles | None = None
+    scan: RegisteredScan | None = None
+    particles: ParticleCloud | None = None
     cpu_ms: float | None = None
     time_to_fix_s: float | None = None
     truth: SE2 | None = None
