@@ -31,7 +31,7 @@ check: $(STAMP)
 
 bench: $(STAMP)
 	$(BIN)/firstfix bench --suite paper --json out/paper.json --report out/paper
-	$(if $(strip $(CASES)),$(BIN)/firstfix bench $(CASES) --method fast --method paper --foreign \
+	$(if $(strip $(CASES)),$(BIN)/firstfix bench $(CASES) --method fast --method paper --wrong-map \
 	    --json out/bench.json --report out/bench,@echo 'no cases in ../shared/cases: to try some, \
 	    name folders with map.yaml and scans.npz: make bench CASES="folder ..."')
 

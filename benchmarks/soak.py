@@ -1,7 +1,7 @@
 """Let the whole system live for half an hour while everything that can happen to it happens.
 
 A real roscore; a simulated robot in a process of its own, which drives about in a built-in
-building; the node with its live page, as users start it; a viewer of the page; and a witness, who
+building; the node with its live page, as users start it; a viewer of the page; and an observer, who
 writes down what the node publishes. A seeded script lets people come, scans and odometry be
 dropped, held back and late, clocks jump, the robot be kidnapped, the node be frozen; and it kills
 and restarts each of the processes, or all at once. In the first half the node is not killed, so
@@ -88,7 +88,7 @@ class Soak:
 
     def _begin(self) -> None:
         self._system.core.start()
-        for start in ("witness", "robot", "node", "viewer"):
+        for start in ("observer", "robot", "node", "viewer"):
             getattr(self._system, f"start_{start}")()
         deadline = time.monotonic() + PATIENCE_S
         while not any(line["topic"] != "localization_status" for line in self._heard()):

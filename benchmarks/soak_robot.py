@@ -36,8 +36,8 @@ from firstfix.core.se2 import SE2
 from firstfix.io.ros_messages.incoming import to_seconds
 from firstfix.io.ros_messages.outgoing import pose_with_covariance, transforms
 from firstfix.lab.scenarios.phases import CarryTo, DriveTo, Manner, Slip, Stand
-from firstfix.lab.scenarios.scenario import Scenario, set_stage
-from firstfix.lab.simulation.simulation import Moment, Stage
+from firstfix.lab.scenarios.scenario import Scenario, start_simulation
+from firstfix.lab.simulation.simulation import Moment, Simulation
 from firstfix.lab.worlds.catalog import WORLDS, random_free_pose
 from firstfix.ros.ros1.master import is_forgotten, register_anew
 from firstfix.ros.ros1.types import make, message_class
@@ -127,9 +127,9 @@ class Robot:
         self._lines = lines
         is_elsewhere = False
         try:
-            self._stage = self._wake(start, seed)
+            self._simulation = self._wake(start, seed)
         except InputError:  # it died where it cannot stand, such as in somebody's hands
-            self._stage, is_elsewhere = self._wake(None, seed), True
+            self._simulation, is_elsewhere = self._wake(None, seed), True
         self._plot: Iterator[Moment] = iter(())
         self._wire = Wire()
         self._wire.told = self._tell
@@ -143,8 +143,8 @@ class Robot:
         if is_elsewhere:
             self._mark("teleport")
 
-    def _wake(self, start: SE2 | None, seed: int) -> Stage:
-        return set_stage(Scenario((), start=start), self._grid, seed)
+    def _wake(self, start: SE2 | None, seed: int) -> Simulation:
+        return start_simulation(Scenario((), start=start), self._grid, seed)
 
     def listen(self) -> None:
         """Take orders from stdin, in a thread."""
@@ -155,7 +155,7 @@ class Robot:
         """Live, in real time, until ROS ends it."""
         T_base_laser = Scenario(()).lidar.T_base_laser
         self._wire.send("/tf_static", transforms(make, 0.0, BASE, LASER, T_base_laser), None)
-        began = time.time() - self._stage.stamp
+        began = time.time() - self._simulation.stamp
         while not rospy.is_shutdown():
             while not self._orders.empty():
                 order = self._orders.get()
@@ -170,8 +170,8 @@ class Robot:
 
     def _wander(self) -> Iterator[Moment]:
         with suppress(InputError):  # where it was put there may be no way out
-            yield from DriveTo(seconds=90.0).play(self._stage)
-        yield from Stand(1.0).play(self._stage)
+            yield from DriveTo(seconds=90.0).run(self._simulation)
+        yield from Stand(1.0).run(self._simulation)
 
     def _report(self, moment: Moment, began: float) -> None:
         odometry = next(event for event in moment.events if isinstance(event, Odometry))
@@ -203,7 +203,7 @@ class Robot:
         self._tell({"kind": "moved", "how": how, "at": now, "until": now + seconds})
 
     def _elsewhere(self) -> SE2:
-        here = self._stage.robot.T_map_base
+        here = self._simulation.robot.T_map_base
         while True:
             there = random_free_pose(self._grid, self._rng)
             if there.distance_to(here) > FAR_M:
@@ -221,25 +221,25 @@ class Robot:
 
     def do_people(self, count: int, manner: str) -> None:
         """Let people come instead of those that were there."""
-        self._stage.people.come(count, Manner(manner), self._stage.robot.T_map_base)
+        self._simulation.people.come(count, Manner(manner), self._simulation.robot.T_map_base)
 
     def do_teleport(self) -> None:
         """Be elsewhere; nothing tells of it."""
-        self._stage.robot.place(self._elsewhere())
+        self._simulation.robot.place(self._elsewhere())
         self._mark("teleport")
-        self._plot = Stand(1.0).play(self._stage)
+        self._plot = Stand(1.0).run(self._simulation)
 
     def do_carry(self, seconds: float) -> None:
         """Be lifted, carried and set down; the wheels say so."""
         self._mark("carry", seconds)
-        carried = CarryTo(self._elsewhere(), seconds).play(self._stage)
-        self._plot = itertools.chain(carried, Stand(1.0).play(self._stage))
+        carried = CarryTo(self._elsewhere(), seconds).run(self._simulation)
+        self._plot = itertools.chain(carried, Stand(1.0).run(self._simulation))
 
     def do_push(self, metres: float, degrees: float) -> None:
         """Be kicked; the wheels stand."""
         self._mark("push", 0.5)
-        pushed = Slip(metres, degrees).play(self._stage)
-        self._plot = itertools.chain(pushed, Stand(1.0).play(self._stage))
+        pushed = Slip(metres, degrees).run(self._simulation)
+        self._plot = itertools.chain(pushed, Stand(1.0).run(self._simulation))
 
     def do_hint(self) -> None:
         """Let somebody say where it is, who is wrong."""

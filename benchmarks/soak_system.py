@@ -101,14 +101,14 @@ class System:
         command = [HERE / "soak_robot.py", self._world, next(self._seeds), self.truth]
         self._start("robot", *command, *(["--start", *start] if start else []))
 
-    def start_witness(self) -> None:
+    def start_observer(self) -> None:
         """Start who listens to the node."""
-        self._start("witness", HERE / "soak_witness.py", "ros", self.said)
+        self._start("observer", HERE / "soak_observer.py", "ros", self.said)
 
     def start_viewer(self) -> None:
         """Start who looks at the page."""
         url = f"ws://127.0.0.1:{self._port}/v1/live"
-        self._start("viewer", HERE / "soak_witness.py", "page", self.seen, url)
+        self._start("viewer", HERE / "soak_observer.py", "page", self.seen, url)
 
     def tell(self, **order: Any) -> None:
         """Tell the robot what happens to it; a dead one does not hear it."""

@@ -69,7 +69,7 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
     # `apart` last: who is imported now must keep the true one for later.
     for place in ("case_tasks", "track_bench", "process_pool"):
-        monkeypatch.setattr(f"firstfix.lab.experiments.{place}.run_apart", run)
+        monkeypatch.setattr(f"firstfix.lab.experiments.{place}.run_in_processes", run)
 
 
 def write_case(folder: Path, grid: OccupancyGrid, poses: list[SE2], site: str) -> Path:

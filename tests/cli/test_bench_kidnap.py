@@ -109,7 +109,7 @@ def test_cases_that_cannot_be_spliced_are_named(cli, drive: Path, cases: Path) -
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        (["--kidnap", "--foreign"], "--foreign"),
+        (["--kidnap", "--wrong-map"], "--wrong-map"),
         (["--kidnap", "--method", "paper"], "--method"),
         (["--kidnap", "--limit", "3"], "--limit"),
         (["--kidnap", "--params", "amcl.yaml"], "--params"),

@@ -82,7 +82,7 @@ def test_costs_of_one_office_are_told(capsys: pytest.CaptureFixture[str], tmp_pa
     ("options", "word"),
     [
         (["--suite", "paper", "--worlds", "moon"], "'moon'"),
-        (["--suite", "paper", "--foreign"], "--foreign"),
+        (["--suite", "paper", "--wrong-map"], "--wrong-map"),
         (["--suite", "paper", "--limit", "3"], "--limit"),
         (["--suite", "paper", "--kidnap"], "--kidnap"),
         (["--suite", "paper", "--worlds", "house", "--json", "file/b.json"], "file/b.json"),

@@ -40,7 +40,7 @@ def test_seed_and_parameters_reach_the_filter(cli, drive: Path, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        (["--track", "--foreign"], "--foreign"),
+        (["--track", "--wrong-map"], "--wrong-map"),
         (["--track", "--method", "paper"], "--method"),
         (["--track", "--limit", "3"], "--limit"),
         (["--track", "--report", "out"], "--report"),

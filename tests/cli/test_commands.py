@@ -43,7 +43,7 @@ def test_version(cli) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_this_process")
 def test_bench_compares_with_the_truth_and_writes_it_down(cli, cases: Path, tmp_path: Path) -> None:
-    arguments = ["--foreign", "--jobs", 2, "--json", "out/bench.json", "--report", "out/report"]
+    arguments = ["--wrong-map", "--jobs", 2, "--json", "out/bench.json", "--report", "out/report"]
     ended = cli("bench", cases, *arguments)
     assert ended.status == 0, ended
     document = json.loads((tmp_path / "out" / "bench.json").read_text())
@@ -53,7 +53,7 @@ def test_bench_compares_with_the_truth_and_writes_it_down(cli, cases: Path, tmp_
     assert (unique["n"], unique["success"], unique["wrong_unique"]) == (3, 1.0, 0)
     assert unique["cpu_s"] > 0.0
     assert unique["rss_mb"] > 20.0
-    assert document["total"]["n"] == document["foreign"]["n"] == 4
+    assert document["total"]["n"] == document["wrong_map"]["n"] == 4
     assert (tmp_path / "out" / "report" / "report.md").read_text().startswith("# firstfix bench")
     assert "| unique " in ended.out
     assert "| scans of " in ended.out
@@ -61,12 +61,12 @@ def test_bench_compares_with_the_truth_and_writes_it_down(cli, cases: Path, tmp_
 
 @pytest.mark.slow
 def test_bench_takes_single_cases_and_a_limit(cli, cases: Path, tmp_path: Path) -> None:
-    ended = cli("bench", cases / "unique", "--limit", 1, "--foreign", "--json", "b.json")
+    ended = cli("bench", cases / "unique", "--limit", 1, "--wrong-map", "--json", "b.json")
     assert ended.status == 0
     document = json.loads((tmp_path / "b.json").read_text())
     assert document["total"]["n"] == 1
-    assert document["foreign"] == {"n": 0, "unique": 0}
-    assert "nothing foreign" in ended.err
+    assert document["wrong_map"] == {"n": 0, "unique": 0}
+    assert "no scan was tried on a wrong map" in ended.err
 
 
 def test_a_case_without_words_is_named_after_its_folder(cases: Path, tmp_path: Path) -> None:
@@ -143,7 +143,7 @@ def test_map_check_of_a_map_with_nothing_in_it(cli, tmp_path: Path, grey: int, w
 
 @pytest.mark.slow
 def test_map_show_marks_what_looks_alike(cli, alike: Files, tmp_path: Path) -> None:
-    for name, options in (("plain.png", []), ("marked.png", ["--alike", "--samples", 4])):
+    for name, options in (("plain.png", []), ("marked.png", ["--aliasing", "--samples", 4])):
         assert cli("map", "show", alike[0], "--plot", name, *options).status == 0
     assert (tmp_path / "marked.png").read_bytes() != (tmp_path / "plain.png").read_bytes()
 

@@ -1,6 +1,8 @@
 """A drawn hall, and answers as a test wants them."""
 
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +13,8 @@ from firstfix.core.recording import Recording
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.lab.experiments.case import Case
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "robots"))  # live_lab
 
 Answer = Callable[..., LocateResult]
 

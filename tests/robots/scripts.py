@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from firstfix.core.grid import OccupancyGrid
 from firstfix.lab.scenarios.phases import CarryTo, DriveTo, Phase, Stand
 from firstfix.lab.scenarios.scenario import Scenario
-from firstfix.lab.simulation.simulation import Moment, Stage
+from firstfix.lab.simulation.simulation import Moment, Simulation
 from firstfix.lab.worlds.catalog import WORLDS, identical_rooms
 
 Script = Callable[[], tuple[OccupancyGrid, Scenario, int]]
@@ -22,10 +22,10 @@ TOLD = threading.Event()
 class StandUntilTold(Phase):
     """Stand still: what follows shall not begin before the test has seen what it waits for."""
 
-    def play(self, stage: Stage) -> Iterator[Moment]:
+    def run(self, simulation: Simulation) -> Iterator[Moment]:
         """Stand."""
         while not TOLD.is_set():
-            yield stage.moment("stand")
+            yield simulation.step("stand")
 
 
 def stand() -> tuple[OccupancyGrid, Scenario, int]:

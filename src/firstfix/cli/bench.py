@@ -37,8 +37,11 @@ def bench(
     report: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write a report with plots to a folder.")
     ] = None,
-    foreign: Annotated[
-        bool, typer.Option("--foreign", help="Also try each case's scans in the next building.")
+    wrong_map: Annotated[
+        bool,
+        typer.Option(
+            "--wrong-map", "--foreign", help="Also try each case's scans in the next building."
+        ),
     ] = False,
     jobs: Annotated[int, typer.Option(min=1, help="Cases that run at a time.")] = 1,
     limit: Annotated[
@@ -71,15 +74,19 @@ def bench(
     """Locate every scan of every case and compare with the truth.
 
     Times are processor time of one scan, kernels compiled, map prepared; memory is the peak of a
-    process that does nothing else. The totals 'total' and 'foreign' of the JSON are those of
+    process that does nothing else. The totals 'total' and 'wrong_map' of the JSON are those of
     the first --method; 'totals' has one for each.
     """
     cases = [*(cases or []), *(more_cases or [])]
-    of_locating = {"--method": method, "--foreign": foreign, "--limit": limit}
+    of_locating = {"--method": method, "--wrong-map": wrong_map, "--limit": limit}
     of_kidnapping = {"--kidnap": kidnapped, "--scenarios": scenarios, "--worlds": worlds}
     of_suites = {"--suite": suite, "--runs": runs}
     if suite is not None:
-        others: dict[str, object] = {"--method": method, "--foreign": foreign, "--params": params}
+        others: dict[str, object] = {
+            "--method": method,
+            "--wrong-map": wrong_map,
+            "--params": params,
+        }
         others |= {"--track": tracked, "--kidnap": kidnapped, "--scenarios": scenarios}
         refuse_options(f"--suite {suite.value}", others)
         bench_suite(
@@ -128,7 +135,7 @@ def bench(
     bench_locate(
         cases,
         list(dict.fromkeys(method or [Method.FAST])),
-        foreign=foreign,
+        wrong_map=wrong_map,
         jobs=jobs,
         limit=limit,
         json_file=json_file,

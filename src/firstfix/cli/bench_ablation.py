@@ -46,11 +46,11 @@ def bench_ablation(
     check_targets(json_file, report)
     from firstfix.lab.experiments.ablation import AblationTask, ablation_document, ablation_table
     from firstfix.lab.experiments.machine import this_machine
-    from firstfix.lab.experiments.process_pool import run_apart
+    from firstfix.lab.experiments.process_pool import run_in_processes
 
     tasks = [AblationTask(case, limit) for case in found]
     with progress(len(tasks), "bench") as done:
-        ended = run_apart(tasks, jobs, lambda i, _: done(found[i].name))
+        ended = run_in_processes(tasks, jobs, lambda i, _: done(found[i].name))
     runs = [run for of_case in ended for run in of_case]
     document = ablation_document(runs) | {"machine": this_machine()}
     typer.echo(ablation_table(document), nl=False)

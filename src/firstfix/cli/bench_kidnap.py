@@ -94,10 +94,10 @@ def bench_kidnap(
     tasks = _tasks(names, cases, scenarios, seed)
     check_targets(json_file, report)
     from firstfix.lab.experiments.kidnap_bench import kidnap_document, kidnap_table, kinds_table
-    from firstfix.lab.experiments.process_pool import run_apart
+    from firstfix.lab.experiments.process_pool import run_in_processes
 
     with progress(len(tasks), "bench") as done:
-        played = run_apart(tasks, jobs, lambda _, ended: done(ended.name))
+        played = run_in_processes(tasks, jobs, lambda _, ended: done(ended.name))
     _tell(played)
     runs = [run for ended in played for run in ended.runs]
     left_out = {ended.name: ended.left_out for ended in played if ended.left_out is not None}

@@ -50,11 +50,11 @@ def bench_paper(
     check_targets(json_file, report)
     from firstfix.lab.experiments.machine import this_machine
     from firstfix.lab.experiments.paper_suite import paper_document, paper_table, worlds_table
-    from firstfix.lab.experiments.process_pool import run_apart
+    from firstfix.lab.experiments.process_pool import run_in_processes
 
     tasks = [PaperTask(name, tuple(range(seed, seed + runs))) for name in names]
     with progress(len(tasks), "bench") as done:
-        played = run_apart(tasks, jobs, lambda _, ended: done(ended.world))
+        played = run_in_processes(tasks, jobs, lambda _, ended: done(ended.world))
     trials = [trial for ended in played for trial in ended.trials]
     document = paper_document(trials, seed, DRIVE_S) | {"machine": this_machine()}
     typer.echo("right / wrong / open")

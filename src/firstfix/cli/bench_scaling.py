@@ -85,7 +85,7 @@ def _measure(
     import numpy as np
 
     from firstfix.global_localization.config import Method
-    from firstfix.lab.experiments.process_pool import run_apart
+    from firstfix.lab.experiments.process_pool import run_in_processes
     from firstfix.lab.experiments.scaling import CostTask, ThroughputTask
     from firstfix.lab.worlds.many_offices import many_offices
 
@@ -93,15 +93,15 @@ def _measure(
     grid = many_offices(count, rng)
     usual = _sightings(grid, _USUAL_BEAMS, rng)
     for method in (Method.FAST, Method.PAPER):
-        (costs,) = run_apart([CostTask(grid, method, (usual,))], 1, lambda *_: None)
+        (costs,) = run_in_processes([CostTask(grid, method, (usual,))], 1, lambda *_: None)
         by_area += costs
     if not beams:
         return
     groups = tuple(_sightings(grid, n, rng) for n in beams)
     for method in (Method.FAST, Method.PAPER):
-        (costs,) = run_apart([CostTask(grid, method, groups)], 1, lambda *_: None)
+        (costs,) = run_in_processes([CostTask(grid, method, groups)], 1, lambda *_: None)
         by_beams += costs
-    (throughputs,) = run_apart([ThroughputTask(grid, usual, THREADS)], 1, lambda *_: None)
+    (throughputs,) = run_in_processes([ThroughputTask(grid, usual, THREADS)], 1, lambda *_: None)
     by_threads += throughputs
 
 

@@ -15,7 +15,7 @@ from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
     from firstfix.core.grid import OccupancyGrid
-    from firstfix.lab.scenarios.episodes import Act, Scene
+    from firstfix.lab.scenarios.episodes import DemoStep, Episode
 
 FAILED = 1
 
@@ -77,29 +77,29 @@ def _tell_story(grid: OccupancyGrid, seed: int, plot: Path) -> None:
 
     with working("preparing the map"):
         # The kernels too: what they take to compile is no part of the story.
-        from firstfix.lab.scenarios.demo_scenario import play, warm_up
-        from firstfix.lab.scenarios.episodes import tell_acts
+        from firstfix.lab.scenarios.demo_scenario import run_demo, warm_up
+        from firstfix.lab.scenarios.episodes import summarize_episodes
         from firstfix.localizer.localizer import Localizer
 
         warm_up()
     with working("the robot drives, and somebody is up to something"):
-        scenes = list(play(grid, seed, Localizer()))
-    acts = tell_acts(scenes)
-    for line in _told(scenes, acts):
+        steps = list(run_demo(grid, seed, Localizer()))
+    episodes = summarize_episodes(steps)
+    for line in _told(steps, episodes):
         typer.echo(line)
     picture = "none, because matplotlib is missing: pip install 'firstfix[plot]'"
     if can_draw():
-        from firstfix.lab.reports.scenario_picture import draw_story
+        from firstfix.lab.reports.scenario_picture import draw_scenario
 
-        picture = f"{draw_story(grid, scenes, plot)}"
+        picture = f"{draw_scenario(grid, steps, plot)}"
     typer.echo(f"Picture    {picture}")
-    if not all(act.went_well for act in acts):
+    if not all(episode.went_well for episode in episodes):
         typer.echo("The end    not all went well.")
         raise typer.Exit(FAILED)
     typer.echo("The end    found, followed, carried away, found again. Nobody had to help.")
 
 
-def _told(scenes: list[Scene], acts: list[Act]) -> list[str]:
+def _told(steps: list[DemoStep], episodes: list[Episode]) -> list[str]:
     from firstfix.cli.answers import pose_text
 
     titles = ("Wakes up", "Carried", "Kidnapped")
@@ -109,33 +109,33 @@ def _told(scenes: list[Scene], acts: list[Act]) -> list[str]:
         "in an instant, and no wheel or switch tells. Now at {pose}",
     )
     lines = []
-    for act, title, words in zip(acts, titles, opening, strict=False):
-        first = next(scene for scene in scenes if scene.stamp >= act.began_s)
+    for episode, title, words in zip(episodes, titles, opening, strict=False):
+        first = next(step for step in steps if step.stamp >= episode.began_s)
         lines.append(f"\n{title:10s} {words.format(pose=pose_text(first.truth))}")
-        lines += [f"           {line}" for line in _act_lines(act)]
-    cpu = sorted(scene.cpu_s for scene in scenes)
+        lines += [f"           {line}" for line in _episode_lines(episode)]
+    cpu = sorted(step.cpu_s for step in steps)
     lines.append(
-        f"\nTime       {scenes[-1].stamp:.0f} s of it, {len(scenes)} scans; the localizer took "
+        f"\nTime       {steps[-1].stamp:.0f} s of it, {len(steps)} scans; the localizer took "
         f"{1e3 * cpu[len(cpu) // 2]:.1f} ms of processor a scan (median), "
-        f"{1e3 * cpu[-1]:.0f} ms at most, {sum(cpu) / scenes[-1].stamp:.1%} of one core"
+        f"{1e3 * cpu[-1]:.0f} ms at most, {sum(cpu) / steps[-1].stamp:.1%} of one core"
     )
     return lines
 
 
-def _act_lines(act: Act) -> list[str]:
-    wrong = [f"{act.wrong_finds} times found where it was not"] if act.wrong_finds else []
-    if act.found_s is None:
+def _episode_lines(episode: Episode) -> list[str]:
+    wrong = [f"{episode.wrong_finds} times found where it was not"] if episode.wrong_finds else []
+    if episode.found_s is None:
         return [*wrong, "not found"]
-    when = "by the first scan" if act.found_s < 0.05 else f"after {act.found_s:.1f} s"
-    noticed = f"noticed after {act.noticed_s:.1f} s, " if act.noticed_s else ""
+    when = "by the first scan" if episode.found_s < 0.05 else f"after {episode.found_s:.1f} s"
+    noticed = f"noticed after {episode.noticed_s:.1f} s, " if episode.noticed_s else ""
     found = (
-        f"{noticed}found {when}, {100 * act.found_error_m:.1f} cm and "
-        f"{act.found_error_deg:.2f}° from the truth"
+        f"{noticed}found {when}, {100 * episode.found_error_m:.1f} cm and "
+        f"{episode.found_error_deg:.2f}° from the truth"
     )
-    if math.isnan(act.kept):
+    if math.isnan(episode.kept):
         return [*wrong, found]
     followed = (
-        f"followed: {act.kept:.1%} of the scans within 0.5 m and 10°, "
-        f"error {100 * act.rmse_m:.1f} cm and {act.rmse_deg:.2f}° (RMSE)"
+        f"followed: {episode.kept:.1%} of the scans within 0.5 m and 10°, "
+        f"error {100 * episode.rmse_m:.1f} cm and {episode.rmse_deg:.2f}° (RMSE)"
     )
     return [*wrong, found, followed]

@@ -79,8 +79,11 @@ def show(
             show_default="firstfix-NAME.png here",
         ),
     ] = None,
-    show_alike: Annotated[
-        bool, typer.Option("--alike", help="Mark which places look alike, as 'map check' does.")
+    show_aliasing: Annotated[
+        bool,
+        typer.Option(
+            "--aliasing", "--alike", help="Mark which places look alike, as 'map check' does."
+        ),
     ] = False,
     samples: alike.Samples = None,
     beams: alike.Beams = 360,
@@ -101,5 +104,5 @@ def show(
     size = f"{grid.width * grid.resolution:.2f} x {grid.height * grid.resolution:.2f} m"
     title = f"{map_path.name}: {size}, {grid.free_area:.1f} m² free"
     typer.echo(f"{size}, {grid.width} x {grid.height} cells, {grid.free_area:.1f} m² free")
-    places = alike.look_around(grid, lidar, samples, seed) if show_alike else ()
+    places = alike.look_around(grid, lidar, samples, seed) if show_aliasing else ()
     typer.echo(f"picture: {draw_grid(grid, target, title, places)}")

@@ -67,14 +67,14 @@ def test_it_warms_up_elsewhere_first_and_never_reads_a_cache(
     assert len(own) == 2
 
 
-def test_foreign_scans_need_no_truth_and_every_unique_is_counted(
+def test_wrong_map_scans_need_no_truth_and_every_unique_is_counted(
     case: Case, cross: LaserScan, matcher: type[Clairvoyant]
 ) -> None:
     nameless = replace(case, recording=lambda: Recording((cross,) * 3))
-    run = runs.run_foreign(nameless, replace(case, name="elsewhere"), Method.FAST)
+    run = runs.run_wrong_map(nameless, replace(case, name="elsewhere"), Method.FAST)
     assert (run.case, run.on, run.n, run.unique) == ("hall", "elsewhere", 3, 3)
     matcher.answers = replace(matcher.answers, verdict=Verdict.AMBIGUOUS)
-    assert runs.run_foreign(nameless, case, Method.FAST, limit=2).unique == 0
+    assert runs.run_wrong_map(nameless, case, Method.FAST, limit=2).unique == 0
 
 
 def test_a_case_without_truth_is_refused(case: Case, cross: LaserScan) -> None:

@@ -14,12 +14,12 @@ from firstfix.core.pose_error import PoseError
 from firstfix.core.recording import Recording
 from firstfix.global_localization.config import Method
 from firstfix.lab.experiments.case import Case
-from firstfix.lab.experiments.case_runs import CaseRun, ForeignRun
-from firstfix.lab.experiments.case_tasks import case_tasks, foreign_tasks, run_tasks
+from firstfix.lab.experiments.case_runs import CaseRun, WrongMapRun
+from firstfix.lab.experiments.case_tasks import case_tasks, run_tasks, wrong_map_tasks
 from firstfix.lab.metrics.metrics import summarize
 from firstfix.lab.metrics.outcome import NO_POSE, Outcome
 from firstfix.lab.reports.document import bench_document
-from firstfix.lab.reports.tables import bench_table, foreign_table, markdown_table
+from firstfix.lab.reports.tables import bench_table, markdown_table, wrong_map_table
 
 KEYS = {
     "name", "method", "n", "success", "success_02", "recall_10", "unique", "wrong_unique",
@@ -40,13 +40,13 @@ RUNS = [
     run("b", Method.FAST, LOST),
     run("a", Method.PAPER, WRONG),
 ]
-FOREIGN = [
-    ForeignRun("a", "b", Method.FAST, 3, 1, "real", (0.97, 0.4, 0.0)),
-    ForeignRun("b", "a", Method.FAST, 1, 0, "sim", (0.3,)),
-    ForeignRun("a", "b", Method.PAPER, 3, 3, "real", (1.0, 1.0, 1.0)),
+WRONG_MAP = [
+    WrongMapRun("a", "b", Method.FAST, 3, 1, "real", (0.97, 0.4, 0.0)),
+    WrongMapRun("b", "a", Method.FAST, 1, 0, "sim", (0.3,)),
+    WrongMapRun("a", "b", Method.PAPER, 3, 3, "real", (1.0, 1.0, 1.0)),
 ]
 METHODS = [Method.FAST, Method.PAPER]
-DOCUMENT = bench_document(RUNS, FOREIGN, METHODS)
+DOCUMENT = bench_document(RUNS, WRONG_MAP, METHODS)
 
 
 def test_every_case_meets_every_method(case: Case) -> None:
@@ -58,11 +58,11 @@ def test_every_case_meets_every_method(case: Case) -> None:
     assert {t.limit for t in tasks} == {3}
 
 
-def test_foreign_maps_are_those_of_the_next_other_building(case: Case) -> None:
+def test_wrong_maps_are_those_of_the_next_other_building(case: Case) -> None:
     cases = [replace(case, name=n, site=n[0]) for n in ("x1", "x2", "y1")]
-    pairs = [(t.case.name, t.on.name) for t in foreign_tasks(cases, [Method.FAST], 0)]
+    pairs = [(t.case.name, t.on.name) for t in wrong_map_tasks(cases, [Method.FAST], 0)]
     assert pairs == [("x1", "y1"), ("x2", "y1"), ("y1", "x1")]
-    assert foreign_tasks(cases[:2], [Method.FAST], 0) == []
+    assert wrong_map_tasks(cases[:2], [Method.FAST], 0) == []
 
 
 @pytest.mark.slow
@@ -76,9 +76,9 @@ def test_a_case_that_cannot_be_loaded_ends_the_benchmark() -> None:
     )
     with pytest.raises(InputError, match="at least one scan"):
         run_tasks(case_tasks([unloadable], [Method.FAST], 0), 1, print)
-    foreign = foreign_tasks([unloadable, replace(unloadable, site="there")], [Method.FAST], 0)
+    wrong_map = wrong_map_tasks([unloadable, replace(unloadable, site="there")], [Method.FAST], 0)
     with pytest.raises((MapError, InputError)):
-        run_tasks(foreign, 2, print)
+        run_tasks(wrong_map, 2, print)
 
 
 def test_the_document_has_the_agreed_keys_and_is_json() -> None:
@@ -106,14 +106,14 @@ def test_totals_are_of_one_method_each_and_the_first_comes_first() -> None:
     assert (total["n"], total["wrong_unique"]) == (4, 1)
     assert total["success"] == pytest.approx((2 / 3 + 0) / 2)
     assert [t["method"] for t in DOCUMENT["totals"]] == ["fast", "paper"]
-    assert DOCUMENT["foreign"] == {"n": 4, "unique": 1}
-    assert len(DOCUMENT["foreign_cases"]) == 3
+    assert DOCUMENT["wrong_map"] == {"n": 4, "unique": 1}
+    assert len(DOCUMENT["wrong_map_cases"]) == 3
 
 
-def test_nothing_foreign_is_nothing_counted() -> None:
+def test_no_wrong_map_is_nothing_counted() -> None:
     document = bench_document(RUNS, [], METHODS)
-    assert document["foreign"] == {"n": 0, "unique": 0}
-    assert document["foreign_cases"] == []
+    assert document["wrong_map"] == {"n": 0, "unique": 0}
+    assert document["wrong_map_cases"] == []
 
 
 def test_tables_show_every_row_aligned() -> None:
@@ -122,7 +122,7 @@ def test_tables_show_every_row_aligned() -> None:
     assert len({len(line) for line in lines}) == 1
     assert "66.7%" in lines[2]
     assert "–" in lines[3]
-    assert len(foreign_table(DOCUMENT).splitlines()) == 2 + 3
+    assert len(wrong_map_table(DOCUMENT).splitlines()) == 2 + 3
 
 
 def test_numbers_stand_right_and_words_left() -> None:

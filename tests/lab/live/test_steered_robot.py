@@ -154,6 +154,6 @@ def test_its_clock_stops_and_goes_on(robot):
 
 def test_where_there_is_no_way_out_it_stays():
     robot = SimRobot(WORLDS["house"](), 1)
-    robot._stage.planner._tightest_m = 99.0  # a robot as large as the house
+    robot._simulation.planner._tightest_m = 99.0  # a robot as large as the house
     moments = [robot.step() for _ in range(100)]
     assert {moment.phase for moment in moments} == {"pause", "stand"}

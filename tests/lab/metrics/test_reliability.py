@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as hnp
 from firstfix.core.estimate import Verdict
 from firstfix.core.pose_error import PoseError
 from firstfix.global_localization.config import Method
-from firstfix.lab.experiments.case_runs import CaseRun, ForeignRun
+from firstfix.lab.experiments.case_runs import CaseRun, WrongMapRun
 from firstfix.lab.metrics.outcome import NO_POSE, Outcome
 from firstfix.lab.metrics.reliability import (
     reliability_bins,
@@ -35,7 +35,7 @@ def test_a_curve_by_hand() -> None:
     assert curve.risk.tolist() == pytest.approx([0.0, 1 / 3, 1 / 4])
 
 
-def test_foreign_scans_are_risk_and_no_coverage() -> None:
+def test_wrong_map_scans_are_risk_and_no_coverage() -> None:
     curve = risk_curve(CLAIMED, RIGHT, np.array([0.98, 0.1]))
     assert curve.thresholds.tolist() == [0.99, 0.98, 0.97, 0.5, 0.1]
     assert curve.coverage.tolist() == pytest.approx([0.2, 0.2, 0.6, 0.8, 0.8])
@@ -77,7 +77,7 @@ def test_every_claim_is_in_one_bin(claimed: np.ndarray) -> None:
         assert 0.0 <= b["right_low"] <= b["right"] <= b["right_high"] <= 1.0
 
 
-def runs() -> tuple[list[CaseRun], list[ForeignRun]]:
+def runs() -> tuple[list[CaseRun], list[WrongMapRun]]:
     right = Outcome(0, Verdict.UNIQUE, PoseError(0.02, 0.001), 1, 0.03, 0.04, 0.99)
     wrong = Outcome(1, Verdict.AMBIGUOUS, PoseError(9.0, 0.001), 2, 0.03, 0.04, 0.6)
     lost = Outcome(2, Verdict.NO_MATCH, NO_POSE, None, 0.01, 0.02, 0.0)
@@ -85,22 +85,22 @@ def runs() -> tuple[list[CaseRun], list[ForeignRun]]:
         CaseRun(name, name, kind, Method.FAST, (right, wrong, lost), 100.0, 0.5, 200.0)
         for name, kind in (("a", "real"), ("b", "real"), ("c", "sim"))
     ]
-    return own, [ForeignRun("a", "c", Method.FAST, 2, 1, "real", (0.96, 0.2))]
+    return own, [WrongMapRun("a", "c", Method.FAST, 2, 1, "real", (0.96, 0.2))]
 
 
 def test_scans_of_a_kind_are_taken_together() -> None:
     real, sim = reliability_document(*runs())
-    assert (real["kind"], real["n"], real["foreign_n"]) == ("real", 6, 2)
-    assert (sim["kind"], sim["n"], sim["foreign_n"]) == ("sim", 3, 0)
-    assert sim["with_foreign"] is None
+    assert (real["kind"], real["n"], real["wrong_map_n"]) == ("real", 6, 2)
+    assert (sim["kind"], sim["n"], sim["wrong_map_n"]) == ("sim", 3, 0)
+    assert sim["with_wrong_map"] is None
     assert real["own"]["unique_coverage"] == pytest.approx(1 / 3)
-    assert (real["own"]["unique_risk"], real["with_foreign"]["unique_risk"]) == (0.0, 1 / 3)
+    assert (real["own"]["unique_risk"], real["with_wrong_map"]["unique_risk"]) == (0.0, 1 / 3)
     assert [b["n"] for b in real["bins"]] == [2, 2, 2]
 
 
-def test_the_table_has_foreign_scans_in_a_line_of_their_own(tmp_path: Path) -> None:
+def test_the_table_has_wrong_map_scans_in_a_line_of_their_own(tmp_path: Path) -> None:
     entries = reliability_document(*runs())
     lines = reliability_table(entries).splitlines()
     assert len(lines) == 2 + 3
-    assert "real and foreign" in lines[3]
+    assert "real and wrong map" in lines[3]
     assert save_reliability(entries, tmp_path / "r.png").stat().st_size > 5000

@@ -8,38 +8,40 @@ import pytest
 
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
-from firstfix.lab.reports.scenario_picture import draw_story
-from firstfix.lab.scenarios.episodes import Scene
+from firstfix.lab.reports.scenario_picture import draw_scenario
+from firstfix.lab.scenarios.episodes import DemoStep
 from firstfix.localizer.precompile_room import small_room
 
 
-def story() -> list[Scene]:
-    def scene(i: int, act: int, *, published: bool) -> Scene:
-        pose = SE2(1.0 + 0.1 * i, 2.0 + act, 0.0)
+def story() -> list[DemoStep]:
+    def step(i: int, episode: int, *, published: bool) -> DemoStep:
+        pose = SE2(1.0 + 0.1 * i, 2.0 + episode, 0.0)
         found = pose if i == 0 else None
-        return Scene(
-            i + 10.0 * act, pose, pose if published else None, found, "", "", act, False, 0
+        return DemoStep(
+            i + 10.0 * episode, pose, pose if published else None, found, "", "", episode, False, 0
         )
 
-    return [scene(i, act, published=i % 4 != 3) for act in range(3) for i in range(12)]
+    return [step(i, episode, published=i % 4 != 3) for episode in range(3) for i in range(12)]
 
 
 @pytest.mark.slow
 def test_a_story_is_drawn(tmp_path: Path) -> None:
-    path = draw_story(small_room(), story(), tmp_path / "story.png")
+    path = draw_scenario(small_room(), story(), tmp_path / "story.png")
     assert path == tmp_path / "story.png"
     assert path.read_bytes().startswith(b"\x89PNG")
-    svg = draw_story(small_room(), story(), tmp_path / "story.svg").read_text()
+    svg = draw_scenario(small_room(), story(), tmp_path / "story.svg").read_text()
     for words in ("truth", "published", "carried away", "found"):
         assert words in svg
 
 
 def test_a_story_without_any_pose_is_drawn(tmp_path: Path) -> None:
-    scenes = [Scene(0.1 * i, SE2(2.0, 2.0, 0.0), None, None, "", "", 0, False, 0) for i in range(3)]
-    assert draw_story(small_room(), scenes, tmp_path / "none.png").exists()
+    steps = [
+        DemoStep(0.1 * i, SE2(2.0, 2.0, 0.0), None, None, "", "", 0, False, 0) for i in range(3)
+    ]
+    assert draw_scenario(small_room(), steps, tmp_path / "none.png").exists()
 
 
 def test_a_folder_that_is_none(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError):
-        draw_story(small_room(), story(), tmp_path / "file" / "story.png")
+        draw_scenario(small_room(), story(), tmp_path / "file" / "story.png")

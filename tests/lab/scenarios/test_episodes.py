@@ -8,19 +8,19 @@ from dataclasses import replace
 import pytest
 
 from firstfix.core.se2 import SE2
-from firstfix.lab.scenarios.episodes import Act, Scene, tell_acts
+from firstfix.lab.scenarios.episodes import DemoStep, Episode, summarize_episodes
 
 HERE, ELSEWHERE = SE2(1.0, 2.0, 0.5), SE2(7.0, 2.0, 0.5)
 
 
-def scene(stamp: float, published: SE2 | None = HERE, **changes: object) -> Scene:
-    usual = Scene(stamp, HERE, published, None, "LOCALIZED", "", 0, False, 0.001)
+def step(stamp: float, published: SE2 | None = HERE, **changes: object) -> DemoStep:
+    usual = DemoStep(stamp, HERE, published, None, "LOCALIZED", "", 0, False, 0.001)
     return replace(usual, **changes)  # type: ignore[arg-type]
 
 
-def one_act(*scenes: Scene) -> Act:
-    (act,) = tell_acts(scenes)
-    return act
+def one_act(*steps: DemoStep) -> Episode:
+    (episode,) = summarize_episodes(steps)
+    return episode
 
 
 @pytest.mark.parametrize(
@@ -33,51 +33,58 @@ def one_act(*scenes: Scene) -> Act:
     ],
 )
 def test_right_is_half_a_metre_and_ten_degrees(off: SE2, *, right: bool) -> None:
-    assert scene(0.0, HERE @ off).is_right is right
+    assert step(0.0, HERE @ off).is_right is right
 
 
 def test_a_robot_that_is_found_at_once_and_followed() -> None:
-    act = one_act(scene(3.0, initial=HERE), scene(3.1), scene(3.2, HERE @ SE2(0.1, 0.0, 0.0)))
-    assert (act.began_s, act.noticed_s, act.found_s, act.wrong_finds) == (3.0, 0.0, 0.0, 0)
-    assert act.kept == 1.0
-    assert act.rmse_m == pytest.approx(0.1 / math.sqrt(3))
-    assert act.went_well
+    episode = one_act(step(3.0, initial=HERE), step(3.1), step(3.2, HERE @ SE2(0.1, 0.0, 0.0)))
+    assert (episode.began_s, episode.noticed_s, episode.found_s, episode.wrong_finds) == (
+        3.0,
+        0.0,
+        0.0,
+        0,
+    )
+    assert episode.kept == 1.0
+    assert episode.rmse_m == pytest.approx(0.1 / math.sqrt(3))
+    assert episode.went_well
 
 
 def test_a_kidnap_is_noticed_when_the_old_pose_is_given_up() -> None:
-    scenes = [scene(0.0, ELSEWHERE), scene(0.1, ELSEWHERE), scene(0.2, None), scene(0.5)]
-    act = one_act(*scenes)
-    assert act.noticed_s == pytest.approx(0.2)
-    assert act.found_s == pytest.approx(0.5)
+    steps = [step(0.0, ELSEWHERE), step(0.1, ELSEWHERE), step(0.2, None), step(0.5)]
+    episode = one_act(*steps)
+    assert episode.noticed_s == pytest.approx(0.2)
+    assert episode.found_s == pytest.approx(0.5)
 
 
 def test_what_is_never_noticed_and_never_found() -> None:
-    act = one_act(scene(0.0, ELSEWHERE), scene(0.1, ELSEWHERE))
-    assert (act.noticed_s, act.found_s) == (None, None)
-    assert math.isnan(act.kept)
-    assert not act.went_well
+    episode = one_act(step(0.0, ELSEWHERE), step(0.1, ELSEWHERE))
+    assert (episode.noticed_s, episode.found_s) == (None, None)
+    assert math.isnan(episode.kept)
+    assert not episode.went_well
 
 
 def test_to_be_found_where_one_is_not_is_no_success() -> None:
-    scenes = [scene(0.0, ELSEWHERE, initial=ELSEWHERE), *(scene(0.1 * i) for i in range(1, 300))]
-    act = one_act(*scenes)
-    assert act.wrong_finds == 1
-    assert not act.went_well
+    steps = [step(0.0, ELSEWHERE, initial=ELSEWHERE), *(step(0.1 * i) for i in range(1, 300))]
+    episode = one_act(*steps)
+    assert episode.wrong_finds == 1
+    assert not episode.went_well
 
 
 def test_to_be_found_and_lost_again_is_none_either() -> None:
-    act = one_act(scene(0.0), scene(0.1), scene(0.2, ELSEWHERE), scene(0.3, None))
-    assert act.kept == 0.5
-    assert not act.went_well
+    episode = one_act(step(0.0), step(0.1), step(0.2, ELSEWHERE), step(0.3, None))
+    assert episode.kept == 0.5
+    assert not episode.went_well
 
 
 def test_time_counts_from_when_the_robot_stands_again() -> None:
-    carried = [scene(0.1 * i, None, lifted=True) for i in range(40)]
-    act = one_act(*carried, scene(4.0, None), scene(4.1))
-    assert act.began_s == 4.0
-    assert act.found_s == pytest.approx(0.1)
+    carried = [step(0.1 * i, None, lifted=True) for i in range(40)]
+    episode = one_act(*carried, step(4.0, None), step(4.1))
+    assert episode.began_s == 4.0
+    assert episode.found_s == pytest.approx(0.1)
 
 
 def test_acts_are_told_apart() -> None:
-    acts = tell_acts([scene(0.0), scene(0.1, act=1), scene(0.2, ELSEWHERE, act=2)])
-    assert [act.found_s for act in acts] == [0.0, 0.0, None]
+    episodes = summarize_episodes(
+        [step(0.0), step(0.1, episode=1), step(0.2, ELSEWHERE, episode=2)]
+    )
+    assert [episode.found_s for episode in episodes] == [0.0, 0.0, None]

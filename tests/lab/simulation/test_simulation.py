@@ -10,14 +10,14 @@ from firstfix.core.se2 import SE2
 from firstfix.lab.simulation.floor import Floor
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.simulation.robot import Kobuki
-from firstfix.lab.simulation.simulation import Disturbance, Shutter, Stage
+from firstfix.lab.simulation.simulation import Disturbance, Shutter, Simulation
 
 START = SE2(4.0, 1.5, 0.3)
 
 
-def stage(grid: OccupancyGrid, shutter: Shutter = Shutter.AT_ONCE) -> Stage:
+def simulation(grid: OccupancyGrid, shutter: Shutter = Shutter.AT_ONCE) -> Simulation:
     lidar = Lidar(sigma_m=0.0)
-    return Stage(Floor(grid), Kobuki(), lidar, shutter, START, np.random.SeedSequence(1))
+    return Simulation(Floor(grid), Kobuki(), lidar, shutter, START, np.random.SeedSequence(1))
 
 
 def turning(T_map_base: SE2) -> tuple[float, float]:
@@ -25,18 +25,18 @@ def turning(T_map_base: SE2) -> tuple[float, float]:
 
 
 def test_odometry_and_signals_come_before_the_scan_of_their_stamp(hall_plan: OccupancyGrid) -> None:
-    played = stage(hall_plan)
-    played.moment("first", turning)
+    played = simulation(hall_plan)
+    played.step("first", turning)
     played.robot.lift()
-    kinds = [type(event) for event in played.moment("second").events]
+    kinds = [type(event) for event in played.step("second").events]
     assert kinds == [Signal, Signal, Odometry, LaserScan, Odometry, Odometry, Odometry, Odometry]
 
 
 def test_truth_is_that_of_the_scan(hall_plan: OccupancyGrid) -> None:
-    played = stage(hall_plan)
+    played = simulation(hall_plan)
     for expected in (0.0, 0.1, 0.2):
         T_map_base = played.robot.T_map_base
-        moment = played.moment("drive", turning)
+        moment = played.step("drive", turning)
         assert moment.T_map_base == T_map_base
         assert moment.scan is not None
         assert moment.scan.stamp == moment.stamp == pytest.approx(expected)
@@ -44,9 +44,9 @@ def test_truth_is_that_of_the_scan(hall_plan: OccupancyGrid) -> None:
 
 
 def test_a_disturbance_is_told_once(hall_plan: OccupancyGrid) -> None:
-    played = stage(hall_plan)
+    played = simulation(hall_plan)
     played.disturbed(Disturbance.PUSHED)
-    told = [played.moment("stand").disturbance for _ in range(2)]
+    told = [played.step("stand").disturbance for _ in range(2)]
     assert told == [Disturbance.PUSHED, None]
 
 
@@ -54,16 +54,16 @@ def test_a_disturbance_is_told_once(hall_plan: OccupancyGrid) -> None:
 def test_only_motion_skews_a_scan(hall_plan: OccupancyGrid, command: object) -> None:
     scans = []
     for shutter in Shutter:
-        played = stage(hall_plan, shutter)
+        played = simulation(hall_plan, shutter)
         for _ in range(5):
-            moment = played.moment("x", command) if command else played.moment("x")  # type: ignore[arg-type]
+            moment = played.step("x", command) if command else played.step("x")  # type: ignore[arg-type]
         assert moment.scan is not None
         scans.append(moment.scan.ranges)
     assert (scans[0] == scans[1]).all() == (command is None)
 
 
 def test_what_goes_with_the_robot_is_seen_beside_it(hall_plan: OccupancyGrid) -> None:
-    played = stage(hall_plan)
-    scan = played.moment("carry", hands=np.array([[0.5, 0.0, 0.1]])).scan
+    played = simulation(hall_plan)
+    scan = played.step("carry", hands=np.array([[0.5, 0.0, 0.1]])).scan
     assert scan is not None
     assert scan.ranges[180] == pytest.approx(0.4, abs=1e-5)

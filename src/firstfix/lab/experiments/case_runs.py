@@ -51,7 +51,7 @@ class CaseRun:
 
 
 @dataclass(frozen=True, slots=True)
-class ForeignRun:
+class WrongMapRun:
     """Scans of one case, tried on the map of another building.
 
     Parameters
@@ -122,7 +122,7 @@ def run_case(case: Case, method: Method, limit: int = 0) -> CaseRun:
     )
 
 
-def run_foreign(case: Case, on: Case, method: Method, limit: int = 0) -> ForeignRun:
+def run_wrong_map(case: Case, on: Case, method: Method, limit: int = 0) -> WrongMapRun:
     """Try scans of one case on the map of another, in this process.
 
     Parameters
@@ -138,14 +138,14 @@ def run_foreign(case: Case, on: Case, method: Method, limit: int = 0) -> Foreign
 
     Returns
     -------
-    ForeignRun
+    WrongMapRun
         How many scans were claimed to be found.
     """
     scans = case.recording().scans
     matcher = ScanMatcher(on.grid(), method=method, cache_dir=None)
     tried = evenly_spaced(np.arange(len(scans)), limit)
     results = [matcher.locate(scans[i]) for i in tried.tolist()]
-    return ForeignRun(
+    return WrongMapRun(
         case=case.name,
         on=on.name,
         method=method,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from firstfix.global_localization.config import Method
 from firstfix.lab.experiments.case import Case, next_elsewhere
-from firstfix.lab.experiments.case_runs import CaseRun, ForeignRun, run_case, run_foreign
-from firstfix.lab.experiments.process_pool import run_apart
+from firstfix.lab.experiments.case_runs import CaseRun, WrongMapRun, run_case, run_wrong_map
+from firstfix.lab.experiments.process_pool import run_in_processes
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class CaseTask:
 
 
 @dataclass(frozen=True, slots=True)
-class ForeignTask:
+class WrongMapTask:
     """Try scans of a case in another building; ``limit`` of them, evenly spaced (0: all)."""
 
     case: Case
@@ -33,9 +33,9 @@ class ForeignTask:
     method: Method
     limit: int = 0
 
-    def __call__(self) -> ForeignRun:
+    def __call__(self) -> WrongMapRun:
         """Run in this process."""
-        return run_foreign(self.case, self.on, self.method, self.limit)
+        return run_wrong_map(self.case, self.on, self.method, self.limit)
 
 
 def case_tasks(cases: Sequence[Case], methods: Sequence[Method], limit: int) -> list[CaseTask]:
@@ -43,13 +43,13 @@ def case_tasks(cases: Sequence[Case], methods: Sequence[Method], limit: int) -> 
     return [CaseTask(case, method, limit) for method in methods for case in cases]
 
 
-def foreign_tasks(
+def wrong_map_tasks(
     cases: Sequence[Case], methods: Sequence[Method], limit: int
-) -> list[ForeignTask]:
+) -> list[WrongMapTask]:
     """List every case with the next one that is another building, with every method."""
     pairs = [(case, next_elsewhere(list(cases), i)) for i, case in enumerate(cases)]
     return [
-        ForeignTask(case, on, method, limit)
+        WrongMapTask(case, on, method, limit)
         for method in methods
         for case, on in pairs
         if on is not None
@@ -57,15 +57,15 @@ def foreign_tasks(
 
 
 def run_tasks(
-    tasks: Sequence[CaseTask | ForeignTask],
+    tasks: Sequence[CaseTask | WrongMapTask],
     jobs: int,
-    on_done: Callable[[CaseRun | ForeignRun], None],
-) -> list[CaseRun | ForeignRun]:
+    on_done: Callable[[CaseRun | WrongMapRun], None],
+) -> list[CaseRun | WrongMapRun]:
     """Run tasks, each in a process of its own.
 
     Parameters
     ----------
-    tasks : sequence of CaseTask or ForeignTask
+    tasks : sequence of CaseTask or WrongMapTask
         What to run.
     jobs : int
         How many processes at a time; more than one makes wall times longer, processor times not.
@@ -74,7 +74,7 @@ def run_tasks(
 
     Returns
     -------
-    list of CaseRun or ForeignRun
+    list of CaseRun or WrongMapRun
         In the order of the tasks.
 
     Raises
@@ -82,4 +82,4 @@ def run_tasks(
     InputError
         If a case cannot be loaded or has no truth.
     """
-    return run_apart(tasks, jobs, lambda _, run: on_done(run))
+    return run_in_processes(tasks, jobs, lambda _, run: on_done(run))

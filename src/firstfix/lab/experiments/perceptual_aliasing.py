@@ -19,7 +19,7 @@ class Look(Enum):
     """What one scan tells at a place."""
 
     FOUND = "UNIQUE and right"
-    ALIKE = "AMBIGUOUS"
+    AMBIGUOUS = "AMBIGUOUS"
     LOST = "NO_MATCH"
     MISTAKEN = "UNIQUE but wrong"
 
@@ -76,7 +76,7 @@ def doubles(places: Sequence[Place]) -> list[tuple[SE2, Hypothesis]]:
     pairs = [
         (place.pose, place.double)
         for place in places
-        if place.double is not None and place.look in (Look.ALIKE, Look.MISTAKEN)
+        if place.double is not None and place.look in (Look.AMBIGUOUS, Look.MISTAKEN)
     ]
     return sorted(pairs, key=lambda pair: -pair[1].probability)
 
@@ -86,7 +86,7 @@ def _look(pose: SE2, result: LocateResult) -> Look:
     if best is None or result.verdict is Verdict.NO_MATCH:
         return Look.LOST
     if result.verdict is Verdict.AMBIGUOUS:
-        return Look.ALIKE
+        return Look.AMBIGUOUS
     return Look.FOUND if _is_at(pose, best) else Look.MISTAKEN
 
 

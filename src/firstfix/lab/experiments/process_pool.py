@@ -20,7 +20,7 @@ from firstfix.core.errors import InputError
 T = TypeVar("T")
 
 
-def run_apart(
+def run_in_processes(
     tasks: Sequence[Callable[[], T]], jobs: int, on_done: Callable[[int, T], None]
 ) -> list[T]:
     """Run tasks, each in a new process, and stop at the first that fails.

@@ -22,7 +22,7 @@ from firstfix.core.se2 import SE2
 from firstfix.lab.experiments.case import Case, known_truth
 from firstfix.lab.experiments.drive import plan_drive
 from firstfix.lab.experiments.drive_tracking import TRUE_START, follow_drive, make_tracker
-from firstfix.lab.experiments.process_pool import peak_rss_mb, run_apart
+from firstfix.lab.experiments.process_pool import peak_rss_mb, run_in_processes
 from firstfix.lab.metrics.metrics import mean_of_known
 from firstfix.lab.metrics.track_metrics import TrackFigures, summarize_track
 from firstfix.lab.reports.tables import Row, columns_table
@@ -120,7 +120,7 @@ def run_track_tasks(
     tasks: Sequence[TrackTask], jobs: int, on_done: Callable[[TrackRun], None]
 ) -> list[TrackRun]:
     """Follow cases, each in a process of its own; arguments as those of `run_tasks`."""
-    return run_apart(tasks, jobs, lambda _, run: on_done(run))
+    return run_in_processes(tasks, jobs, lambda _, run: on_done(run))
 
 
 def track_document(runs: Sequence[TrackRun]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.lab.scenarios.phases import CarryTo, DriveTo, Manner, Pause, Stand
-from firstfix.lab.scenarios.scenario import Scenario, check_room, set_stage
+from firstfix.lab.scenarios.scenario import Scenario, check_room, start_simulation
 from firstfix.lab.simulation.simulation import Moment
 
 MOST_PEOPLE = 30
@@ -40,7 +40,7 @@ class SimRobot:
 
     def __init__(self, grid: OccupancyGrid, seed: int) -> None:
         self._scenario = Scenario(())
-        self._stage = set_stage(self._scenario, grid, seed)
+        self._simulation = start_simulation(self._scenario, grid, seed)
         self._lock = threading.Lock()
         self._plot: Iterator[Moment] = self._wake()
         self.is_paused = False
@@ -48,7 +48,7 @@ class SimRobot:
     @property
     def T_map_base(self) -> SE2:
         """Where it truly is."""
-        return self._stage.robot.T_map_base
+        return self._simulation.robot.T_map_base
 
     def step(self) -> Moment | None:
         """Go on to the next scan; None while it is paused."""
@@ -79,7 +79,7 @@ class SimRobot:
         goal = SE2(x, y, 0.0)
         with self._lock:
             self._check(goal)
-            self._stage.planner.path(self.T_map_base, goal)
+            self._simulation.planner.path(self.T_map_base, goal)
             self._plot = self._drive(goal, _PATIENCE_S)
 
     def carry_to(self, T_map_base: SE2) -> None:
@@ -109,26 +109,26 @@ class SimRobot:
                 remedy="ask for fewer",
             )
         with self._lock:
-            self._stage.people.come(people, Manner.WALK, self.T_map_base)
+            self._simulation.people.come(people, Manner.WALK, self.T_map_base)
 
     def _check(self, place: SE2) -> None:
-        if self._stage.robot.lifted:
+        if self._simulation.robot.lifted:
             raise InputError(
                 expected="a robot on its wheels",
                 received="one in somebody's hands",
                 remedy=f"wait until it stands again, at most {_CARRY_S:g} s",
             )
-        check_room(self._stage.floor, place, self._scenario.kobuki.radius_m)
+        check_room(self._simulation.floor, place, self._scenario.kobuki.radius_m)
 
     def _wake(self) -> Iterator[Moment]:
-        yield from Pause(_BREAK_S).play(self._stage)
-        yield from Stand(_BREAK_S).play(self._stage)
+        yield from Pause(_BREAK_S).run(self._simulation)
+        yield from Stand(_BREAK_S).run(self._simulation)
 
     def _drive(self, goal: SE2 | None, rest_s: float) -> Iterator[Moment]:
         with suppress(InputError):  # where it was put there may be no way out: it stays
-            yield from DriveTo(goal).play(self._stage)
-        yield from Stand(rest_s).play(self._stage)
+            yield from DriveTo(goal).run(self._simulation)
+        yield from Stand(rest_s).run(self._simulation)
 
     def _be_carried(self, T_map_base: SE2) -> Iterator[Moment]:
-        yield from CarryTo(T_map_base, _CARRY_S).play(self._stage)
-        yield from Stand(_REST_S).play(self._stage)
+        yield from CarryTo(T_map_base, _CARRY_S).run(self._simulation)
+        yield from Stand(_REST_S).run(self._simulation)

@@ -2,11 +2,11 @@
 
 For the JSON document of ``bench``, one entry for each method and kind of case::
 
-    {"method", "kind", "n", "foreign_n",
+    {"method", "kind", "n", "wrong_map_n",
      "bins": [{"from", "to", "n", "claimed", "right", "right_low", "right_high"}, ...],
      "own": {"unique_coverage", "unique_risk", "coverage_at_goal_risk", "risk_at_goal_coverage",
              "curve": {"threshold": [...], "coverage": [...], "risk": [...]}},
-     "with_foreign": {...the same...} or null}
+     "with_wrong_map": {...the same...} or null}
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.global_localization.config import LocateConfig
-from firstfix.lab.experiments.case_runs import CaseRun, ForeignRun
+from firstfix.lab.experiments.case_runs import CaseRun, WrongMapRun
 from firstfix.lab.reports.tables import Row, columns_table
 
 GOAL_RISK = 0.003
@@ -57,7 +57,7 @@ class RiskCurve:
     coverage : ndarray, shape (n,)
         Share of the scans on their own map that is answered.
     risk : ndarray, shape (n,)
-        Share of all answers that is wrong; a scan on a foreign map has no right one.
+        Share of all answers that is wrong; a scan on a wrong map has no right one.
     """
 
     thresholds: NDArray[np.float64]
@@ -84,7 +84,7 @@ class RiskCurve:
 def risk_curve(
     probabilities: NDArray[np.float64],
     right: NDArray[np.bool_],
-    foreign: NDArray[np.float64],
+    wrong_map: NDArray[np.float64],
 ) -> RiskCurve:
     """Sweep the threshold over all probabilities that occur.
 
@@ -94,7 +94,7 @@ def risk_curve(
         Claimed for the best place of each scan on its own map; at least one.
     right : ndarray of bool, shape (n,)
         Whether it is the right place.
-    foreign : ndarray, shape (m,)
+    wrong_map : ndarray, shape (m,)
         Claimed for the best place of scans of other buildings; empty to leave them out.
 
     Returns
@@ -102,11 +102,11 @@ def risk_curve(
     RiskCurve
         One point for every probability above 0: who claims nothing is never answered.
     """
-    thresholds = np.unique(np.concatenate([probabilities, foreign]))[::-1]
+    thresholds = np.unique(np.concatenate([probabilities, wrong_map]))[::-1]
     thresholds = thresholds[thresholds > 0.0]
     answered = _count_from(probabilities, thresholds)
     wrong = _count_from(probabilities[~right], thresholds)
-    accepted = _count_from(foreign, thresholds)
+    accepted = _count_from(wrong_map, thresholds)
     risk = (wrong + accepted) / np.maximum(1, answered + accepted)
     return RiskCurve(thresholds, answered / len(probabilities), risk)
 
@@ -152,7 +152,7 @@ def reliability_bins(
 
 
 def reliability_document(
-    runs: Sequence[CaseRun], foreign: Sequence[ForeignRun]
+    runs: Sequence[CaseRun], wrong_map: Sequence[WrongMapRun]
 ) -> list[dict[str, Any]]:
     """Put all scans of a method and kind into figures, as described above.
 
@@ -160,7 +160,7 @@ def reliability_document(
     ----------
     runs : sequence of CaseRun
         Cases on their own maps.
-    foreign : sequence of ForeignRun
+    wrong_map : sequence of WrongMapRun
         Cases on the maps of others; may be empty.
 
     Returns
@@ -172,39 +172,39 @@ def reliability_document(
     return [
         _entry(
             [run for run in runs if (run.method, run.kind) == key],
-            [run for run in foreign if (run.method, run.kind) == key],
+            [run for run in wrong_map if (run.method, run.kind) == key],
         )
         for key in keys
     ]
 
 
 def reliability_table(entries: Sequence[Row]) -> str:
-    """Lay out coverage and risk of every method and kind, without and with foreign scans."""
+    """Lay out coverage and risk of every method and kind, without and with wrong-map scans."""
     rows = []
     for entry in entries:
         words = {"method": entry["method"], "kind": entry["kind"]}
         rows.append({**words, **entry["own"], "scans": entry["n"]})
-        if entry["with_foreign"] is not None:
-            words["kind"] += " and foreign"
-            scans = entry["n"] + entry["foreign_n"]
-            rows.append({**words, **entry["with_foreign"], "scans": scans})
+        if entry["with_wrong_map"] is not None:
+            words["kind"] += " and wrong map"
+            scans = entry["n"] + entry["wrong_map_n"]
+            rows.append({**words, **entry["with_wrong_map"], "scans": scans})
     return columns_table(rows, {"method": "method", "scans of": "kind"}, COLUMNS)
 
 
-def _entry(runs: Sequence[CaseRun], foreign: Sequence[ForeignRun]) -> dict[str, Any]:
+def _entry(runs: Sequence[CaseRun], wrong_map: Sequence[WrongMapRun]) -> dict[str, Any]:
     outcomes = [outcome for run in runs for outcome in run.outcomes]
     probabilities = np.array([outcome.probability for outcome in outcomes])
     right = np.array([outcome.is_found for outcome in outcomes], np.bool_)
-    elsewhere = np.array([p for run in foreign for p in run.probabilities])
+    elsewhere = np.array([p for run in wrong_map for p in run.probabilities])
     nowhere = np.empty(0)
     return {
         "method": runs[0].method.value,
         "kind": runs[0].kind,
         "n": len(outcomes),
-        "foreign_n": len(elsewhere),
+        "wrong_map_n": len(elsewhere),
         "bins": reliability_bins(probabilities, right),
         "own": _figures(risk_curve(probabilities, right, nowhere)),
-        "with_foreign": _figures(risk_curve(probabilities, right, elsewhere))
+        "with_wrong_map": _figures(risk_curve(probabilities, right, elsewhere))
         if len(elsewhere)
         else None,
     }

@@ -4,14 +4,14 @@
 
     {"cases": [{"name", "method", "site", "kind", "free_area_m2",
                 ...the figures of `metrics.Summary`..., "prepare_s", "rss_mb"}, ...],
-     "foreign": {"n", "unique"},
+     "wrong_map": {"n", "unique"},
      "total": {"name": "total", "method", ...the same figures...},
      "totals": [...one such total for each method...],
-     "foreign_cases": [{"name", "on", "method", "n", "unique"}, ...],
+     "wrong_map_cases": [{"name", "on", "method", "n", "unique"}, ...],
      "reliability": [...see `reliability`...],
      "machine": {...see `machine.this_machine`...}}
 
-``total`` and ``foreign`` are those of the first method asked for: a mean over different methods
+``total`` and ``wrong_map`` are those of the first method asked for: a mean over different methods
 would be the figure of none.
 """
 
@@ -22,14 +22,14 @@ from dataclasses import asdict
 from typing import Any
 
 from firstfix.global_localization.config import Method
-from firstfix.lab.experiments.case_runs import CaseRun, ForeignRun
+from firstfix.lab.experiments.case_runs import CaseRun, WrongMapRun
 from firstfix.lab.experiments.machine import this_machine
 from firstfix.lab.metrics.metrics import mean_of_known, summarize, total
 from firstfix.lab.metrics.reliability import reliability_document
 
 
 def bench_document(
-    runs: Sequence[CaseRun], foreign: Sequence[ForeignRun], methods: Sequence[Method]
+    runs: Sequence[CaseRun], wrong_map: Sequence[WrongMapRun], methods: Sequence[Method]
 ) -> dict[str, Any]:
     """Put a benchmark into the document described above.
 
@@ -37,7 +37,7 @@ def bench_document(
     ----------
     runs : sequence of CaseRun
         Cases on their own maps.
-    foreign : sequence of ForeignRun
+    wrong_map : sequence of WrongMapRun
         Cases on the maps of others.
     methods : sequence of Method
         In the order asked for, at least one.
@@ -50,14 +50,14 @@ def bench_document(
     totals = [_total(runs, method) for method in methods]
     return {
         "cases": [case_row(run) for run in runs],
-        "foreign": _foreign_total(foreign, methods[0]),
+        "wrong_map": _wrong_map_total(wrong_map, methods[0]),
         "total": totals[0],
         "totals": totals,
-        "foreign_cases": [
+        "wrong_map_cases": [
             {"name": f.case, "on": f.on, "method": f.method.value, "n": f.n, "unique": f.unique}
-            for f in foreign
+            for f in wrong_map
         ],
-        "reliability": reliability_document(runs, foreign),
+        "reliability": reliability_document(runs, wrong_map),
         "machine": this_machine(),
     }
 
@@ -88,6 +88,6 @@ def _total(runs: Sequence[CaseRun], method: Method) -> dict[str, Any]:
     }
 
 
-def _foreign_total(foreign: Sequence[ForeignRun], method: Method) -> dict[str, int]:
-    own = [run for run in foreign if run.method is method]
+def _wrong_map_total(wrong_map: Sequence[WrongMapRun], method: Method) -> dict[str, int]:
+    own = [run for run in wrong_map if run.method is method]
     return {"n": sum(run.n for run in own), "unique": sum(run.unique for run in own)}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 LOOK_COLOURS = {
     Look.FOUND: GREEN,
-    Look.ALIKE: ORANGE,
+    Look.AMBIGUOUS: ORANGE,
     Look.LOST: PURPLE,
     Look.MISTAKEN: RED,
 }

@@ -45,9 +45,9 @@ def save_reliability(entries: Sequence[Row], path: Path) -> Path:
         label = f"{entry['method']}, {entry['kind']} ({entry['n']} scans)"
         _draw_bins(diagram, entry, colour, label)
         _draw_curve(curves, entry["own"]["curve"], colour, "-", label)
-        if entry["with_foreign"] is not None:
-            more = f"and {entry['foreign_n']} on foreign maps"
-            _draw_curve(curves, entry["with_foreign"]["curve"], colour, ":", more)
+        if entry["with_wrong_map"] is not None:
+            more = f"and {entry['wrong_map_n']} on wrong maps"
+            _draw_curve(curves, entry["with_wrong_map"]["curve"], colour, ":", more)
     diagram.plot([0.0, 1.0], [0.0, 1.0], color="0.6", lw=1, zorder=0)
     diagram.set(xlabel="probability claimed for the best place", ylabel="share that is right")
     diagram.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.05))

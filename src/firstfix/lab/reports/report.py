@@ -15,7 +15,7 @@ from firstfix.lab.metrics.outcome import FOUND
 from firstfix.lab.metrics.reliability import reliability_table
 from firstfix.lab.reports.page import write_page
 from firstfix.lab.reports.reliability_picture import save_reliability
-from firstfix.lab.reports.tables import bench_table, foreign_table
+from firstfix.lab.reports.tables import bench_table, wrong_map_table
 from firstfix.plots.figure import (
     PALETTE,
     line_style,
@@ -40,7 +40,7 @@ RELIABILITY = (
     "Left: of the scans for whose best place a probability was claimed, so many are right (bars: "
     "95 % intervals; small numbers: scans). Right: if everything from a probability on is "
     "answered, so much is covered, and so much of it is wrong. Scans count alike, whatever case "
-    "they are of. Foreign: scans of other buildings, where they were tried; they have no right "
+    "they are of. Wrong map: scans of other buildings, where they were tried; they have no right "
     "answer, so that every answer is a risk."
 )
 
@@ -139,8 +139,8 @@ def _parts(document: dict[str, Any]) -> list[str]:
         LEGEND,
         bench_table(document),
     ]
-    if document["foreign_cases"]:
-        parts += ["## Scans on the maps of other buildings", foreign_table(document)]
+    if document["wrong_map_cases"]:
+        parts += ["## Scans on the maps of other buildings", wrong_map_table(document)]
     parts += [
         "## Probabilities",
         RELIABILITY,

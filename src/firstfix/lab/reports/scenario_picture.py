@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.lab.scenarios.episodes import Scene
+from firstfix.lab.scenarios.episodes import DemoStep
 from firstfix.plots.figure import BLUE, GREEN, RED, new_figure, save_figure
 from firstfix.plots.map_image import draw_map
 
@@ -18,14 +18,14 @@ LONG_SIDE_IN = 12.0
 LETTERING_IN = 1.2
 
 
-def draw_story(grid: OccupancyGrid, scenes: Sequence[Scene], path: Path) -> Path:
+def draw_scenario(grid: OccupancyGrid, steps: Sequence[DemoStep], path: Path) -> Path:
     """Draw a story into a file.
 
     Parameters
     ----------
     grid : OccupancyGrid
         The map.
-    scenes : sequence of Scene
+    steps : sequence of DemoStep
         At least one.
     path : Path
         Where the picture goes; its suffix names the format: .png, .svg or .pdf.
@@ -45,31 +45,31 @@ def draw_story(grid: OccupancyGrid, scenes: Sequence[Scene], path: Path) -> Path
     figure = new_figure(scale * wide, scale * high + LETTERING_IN)
     axes = figure.subplots()
     draw_map(axes, grid)
-    for act in sorted({scene.act for scene in scenes}):
-        part = [scene for scene in scenes if scene.act == act]
-        label = act == 0
+    for episode in sorted({step.episode for step in steps}):
+        part = [step for step in steps if step.episode == episode]
+        label = episode == 0
         axes.plot(*_xy([s.truth for s in part if not s.lifted]), color="black", lw=2.6,
                   label="truth" if label else None, zorder=3)  # fmt: skip
         axes.plot(*_xy([s.published for s in part]), color=BLUE, lw=1.4,
                   label="published" if label else None, zorder=4)  # fmt: skip
-        if act > 0:
-            carried = [scenes[scenes.index(part[0]) - 1].truth, _first_standing(part).truth]
+        if episode > 0:
+            carried = [steps[steps.index(part[0]) - 1].truth, _first_standing(part).truth]
             axes.plot(*_xy(carried), ":", color=RED, lw=1.5, zorder=2,
-                      label="carried away" if act == 1 else None)  # fmt: skip
-    found = [scene for scene in scenes if scene.initial is not None]
-    for i, scene in enumerate(found):
-        initial = scene.initial or scene.truth
+                      label="carried away" if episode == 1 else None)  # fmt: skip
+    found = [step for step in steps if step.initial is not None]
+    for i, step in enumerate(found):
+        initial = step.initial or step.truth
         axes.plot(initial.x, initial.y, "o", color=GREEN, ms=11, mec="white", zorder=6,
                   label="found" if i == 0 else None)  # fmt: skip
-        axes.annotate(f"{scene.stamp:.1f} s", (initial.x, initial.y), (8, 8),
+        axes.annotate(f"{step.stamp:.1f} s", (initial.x, initial.y), (8, 8),
                       textcoords="offset points", zorder=7, color=GREEN, weight="bold")  # fmt: skip
     axes.set(title="Found, followed, carried away, found again")
     figure.legend(loc="outside lower center", ncols=5)
     return save_figure(figure, path)
 
 
-def _first_standing(scenes: Sequence[Scene]) -> Scene:
-    return next((scene for scene in scenes if not scene.lifted), scenes[-1])
+def _first_standing(steps: Sequence[DemoStep]) -> DemoStep:
+    return next((step for step in steps if not step.lifted), steps[-1])
 
 
 def _xy(poses: Sequence[SE2 | None]) -> NDArray[np.float64]:

@@ -44,11 +44,11 @@ def bench_table(document: Row) -> str:
     return columns_table(rows, {"case": "name", "method": "method"}, COLUMNS)
 
 
-def foreign_table(document: Row) -> str:
+def wrong_map_table(document: Row) -> str:
     """Lay out the scans that were tried on maps of other buildings."""
     cells = [
         [f["name"], f["on"], f["method"], str(f["n"]), str(f["unique"])]
-        for f in document["foreign_cases"]
+        for f in document["wrong_map_cases"]
     ]
     return markdown_table(["scans of", "on the map of", "method", "n", "unique (all wrong)"], cells)
 

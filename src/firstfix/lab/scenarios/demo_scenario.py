@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Signal, SignalKind
 from firstfix.lab.scenarios.disturbances import CarryTo, Teleport
-from firstfix.lab.scenarios.episodes import Scene
+from firstfix.lab.scenarios.episodes import DemoStep
 from firstfix.lab.scenarios.phases import DriveTo, Stand
 from firstfix.lab.scenarios.scenario import Scenario, run
 from firstfix.lab.simulation.simulation import Disturbance
@@ -35,11 +35,11 @@ SCRIPT = (
 
 def warm_up() -> None:
     """Load or compile all kernels that a story needs, by a short one in a small room."""
-    for _ in play(small_room(), 0, Localizer()):
+    for _ in run_demo(small_room(), 0, Localizer()):
         pass
 
 
-def play(grid: OccupancyGrid, seed: int, localizer: Localizer) -> Iterator[Scene]:
+def run_demo(grid: OccupancyGrid, seed: int, localizer: Localizer) -> Iterator[DemoStep]:
     """Play the script in a building and hand all that the robot reports to a localizer.
 
     Parameters
@@ -53,11 +53,11 @@ def play(grid: OccupancyGrid, seed: int, localizer: Localizer) -> Iterator[Scene
 
     Yields
     ------
-    Scene
+    DemoStep
         One a scan.
     """
     localizer.handle(NewMap(0.0, grid))
-    act = 0
+    episode = 0
     lifted: set[SignalKind] = set()
     for moment in run(Scenario(SCRIPT), grid, seed):
         began = time.process_time()
@@ -65,23 +65,23 @@ def play(grid: OccupancyGrid, seed: int, localizer: Localizer) -> Iterator[Scene
         for event, answers in replay(iter(moment.events), localizer):
             outputs += answers
             if isinstance(event, Signal) and event.kind.means_lifted:
-                # Carried: the act begins with the first sensor that notices.
-                act += event.active and not lifted
+                # Carried: the episode begins with the first sensor that notices.
+                episode += event.active and not lifted
                 (lifted.add if event.active else lifted.discard)(event.kind)
         cpu_s = time.process_time() - began
         if moment.disturbance is Disturbance.TELEPORTED:
-            act += 1
+            episode += 1
         tracked = [output for output in outputs if isinstance(output, TrackedPose)]
         found = [output for output in outputs if isinstance(output, InitialPose)]
         told = [output for output in outputs if isinstance(output, Status)]
-        yield Scene(
+        yield DemoStep(
             stamp=moment.stamp,
             truth=moment.T_map_base,
             published=tracked[-1].T_map_base if tracked else None,
             initial=found[-1].T_map_base if found else None,
             state=localizer.state.value,
             reason=told[-1].reason if told else "",
-            act=act,
+            episode=episode,
             lifted=bool(lifted),
             cpu_s=cpu_s,
         )

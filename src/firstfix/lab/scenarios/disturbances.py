@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.lab.scenarios.phase import Phase, periods
-from firstfix.lab.simulation.simulation import ODOMETRY_HZ, PERIOD_S, Disturbance, Moment, Stage
+from firstfix.lab.simulation.simulation import (
+    ODOMETRY_HZ,
+    PERIOD_S,
+    Disturbance,
+    Moment,
+    Simulation,
+)
 from firstfix.lab.simulation.sweep import NOBODY
 from firstfix.lab.worlds.catalog import random_free_pose
 
@@ -45,10 +51,10 @@ class Teleport(Phase):
         """Where it will be."""
         return () if self.to is None else (self.to,)
 
-    def play(self, stage: Stage) -> Iterator[Moment]:
+    def run(self, simulation: Simulation) -> Iterator[Moment]:
         """Move it between two scans."""
-        stage.robot.place(_somewhere(stage) if self.to is None else self.to)
-        stage.disturbed(Disturbance.TELEPORTED)
+        simulation.robot.place(_somewhere(simulation) if self.to is None else self.to)
+        simulation.disturbed(Disturbance.TELEPORTED)
         yield from ()
 
 
@@ -78,14 +84,14 @@ class CarryTo(Phase):
         """Where it will be."""
         return () if self.to is None else (self.to,)
 
-    def play(self, stage: Stage) -> Iterator[Moment]:
+    def run(self, simulation: Simulation) -> Iterator[Moment]:
         """Lift, carry, set down."""
-        robot = stage.robot
-        start, goal = robot.T_map_base, _somewhere(stage) if self.to is None else self.to
-        way = _way(stage, start, goal)
+        robot = simulation.robot
+        start, goal = robot.T_map_base, _somewhere(simulation) if self.to is None else self.to
+        way = _way(simulation, start, goal)
         lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))])
         steps = max(1, periods(self.seconds))
-        sway = stage.rng.uniform(-_SWAY_RAD, _SWAY_RAD, 2)
+        sway = simulation.rng.uniform(-_SWAY_RAD, _SWAY_RAD, 2)
         turn = (start.inverse() @ goal).yaw
         robot.lift()
         for i in range(steps):
@@ -93,10 +99,10 @@ class CarryTo(Phase):
             x, y = (float(np.interp(share * lengths[-1], lengths, side)) for side in way.T)
             to_and_fro = float(sway @ np.sin(share * math.pi * np.array([2.0, 5.0])))
             robot.place(SE2(x, y, start.yaw + share * turn + to_and_fro))
-            yield stage.moment("carry", hands=_HANDS[self.grip])
+            yield simulation.step("carry", hands=_HANDS[self.grip])
         robot.place(goal)
         robot.set_down()
-        stage.disturbed(Disturbance.CARRIED)
+        simulation.disturbed(Disturbance.CARRIED)
 
 
 class SlipKind(Enum):
@@ -125,26 +131,26 @@ class Slip(Phase):
     kind: SlipKind = SlipKind.PUSHED
     seconds: float = 0.5
 
-    def play(self, stage: Stage) -> Iterator[Moment]:
+    def run(self, simulation: Simulation) -> Iterator[Moment]:
         """Slip a little with every tick."""
         steps = max(1, periods(self.seconds))
         ticks = round(steps * PERIOD_S * ODOMETRY_HZ)
         length, turn = self.metres / ticks, math.radians(self.degrees) / ticks
-        bearing = float(stage.rng.uniform(-math.pi, math.pi))
+        bearing = float(simulation.rng.uniform(-math.pi, math.pi))
 
         def tick(T_map_base: SE2) -> tuple[float, float]:
             if self.kind is SlipKind.SPINNING:
-                stage.robot.spin_wheels(length, turn)
+                simulation.robot.spin_wheels(length, turn)
             else:
                 # The robot turns while it slides; the foot that pushes does not.
                 aside = bearing - T_map_base.yaw
-                stage.robot.push(SE2(length * math.cos(aside), length * math.sin(aside), turn))
+                simulation.robot.push(SE2(length * math.cos(aside), length * math.sin(aside), turn))
             return 0.0, 0.0
 
         for _ in range(steps):
-            yield stage.moment("slip", tick)
+            yield simulation.step("slip", tick)
         pushed = self.kind is SlipKind.PUSHED
-        stage.disturbed(Disturbance.PUSHED if pushed else Disturbance.SLIPPED)
+        simulation.disturbed(Disturbance.PUSHED if pushed else Disturbance.SLIPPED)
 
 
 def _ring() -> NDArray[np.float64]:
@@ -161,12 +167,12 @@ _HANDS: dict[Grip, NDArray[np.float64]] = {
 }
 
 
-def _somewhere(stage: Stage) -> SE2:
-    return random_free_pose(stage.floor.grid, stage.rng)
+def _somewhere(simulation: Simulation) -> SE2:
+    return random_free_pose(simulation.floor.grid, simulation.rng)
 
 
-def _way(stage: Stage, start: SE2, goal: SE2) -> NDArray[np.float64]:
+def _way(simulation: Simulation, start: SE2, goal: SE2) -> NDArray[np.float64]:
     try:
-        return stage.planner.path(start, goal)
+        return simulation.planner.path(start, goal)
     except InputError:  # over a wall, then
         return np.array([[start.x, start.y], [goal.x, goal.y]])

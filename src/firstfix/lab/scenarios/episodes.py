@@ -14,7 +14,7 @@ from firstfix.lab.metrics.outcome import is_found
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class DemoStep:
     """One scan of the story.
 
     Parameters
@@ -31,7 +31,7 @@ class Scene:
         What the localizer was doing after the scan.
     reason : str
         Why, as it said.
-    act : int
+    episode : int
         Which part of the story this is: a new one begins with each kidnap.
     lifted : bool
         True while somebody carries the robot.
@@ -45,7 +45,7 @@ class Scene:
     initial: SE2 | None
     state: str
     reason: str
-    act: int
+    episode: int
     lifted: bool
     cpu_s: float
 
@@ -56,7 +56,7 @@ class Scene:
 
 
 @dataclass(frozen=True, slots=True)
-class Act:
+class Episode:
     """One part of the story: from a kidnap, or the beginning, to the next.
 
     Parameters
@@ -89,52 +89,51 @@ class Act:
 
     @property
     def went_well(self) -> bool:
-        """True if the robot was found, nowhere else before, and followed to the end of the act."""
+        """True if the robot was found at once at the right place and tracked to the end."""
         return self.found_s is not None and self.wrong_finds == 0 and self.kept > 0.99
 
 
-def tell_acts(scenes: Sequence[Scene]) -> list[Act]:
-    """Sum up each act.
+def summarize_episodes(steps: Sequence[DemoStep]) -> list[Episode]:
+    """Sum up each episode.
 
     Parameters
     ----------
-    scenes : sequence of Scene
+    steps : sequence of DemoStep
         In the order of their stamps.
 
     Returns
     -------
-    list of Act
+    list of Episode
         In order.
     """
-    numbers = sorted({scene.act for scene in scenes})
-    return [_tell([scene for scene in scenes if scene.act == number]) for number in numbers]
+    numbers = sorted({step.episode for step in steps})
+    return [_tell([step for step in steps if step.episode == number]) for number in numbers]
 
 
-def _tell(scenes: list[Scene]) -> Act:
-    standing = [scene for scene in scenes if not scene.lifted]
-    seeing = standing or scenes
+def _tell(steps: list[DemoStep]) -> Episode:
+    standing = [step for step in steps if not step.lifted]
+    seeing = standing or steps
     began = seeing[0].stamp
-    given_up = [scene for scene in seeing if scene.published is None or scene.is_right]
-    found = next((i for i, scene in enumerate(seeing) if scene.is_right), None)
+    given_up = [step for step in seeing if step.published is None or step.is_right]
+    found = next((i for i, step in enumerate(seeing) if step.is_right), None)
     after = seeing[found:] if found is not None else []
     off = [
-        PoseError.between(scene.published, scene.truth)
-        for scene in after
-        if scene.published is not None
+        PoseError.between(step.published, step.truth)
+        for step in after
+        if step.published is not None
     ]
     metres = np.array([error.metres for error in off])
     degrees = np.array([error.radians for error in off]) * math.degrees(1.0)
-    return Act(
+    return Episode(
         began_s=began,
         noticed_s=given_up[0].stamp - began if given_up else None,
         found_s=seeing[found].stamp - began if found is not None else None,
         found_error_m=float(metres[0]) if len(metres) else math.nan,
         found_error_deg=float(degrees[0]) if len(degrees) else math.nan,
         wrong_finds=sum(
-            scene.initial is not None and not is_found(scene.initial, scene.truth)
-            for scene in scenes
+            step.initial is not None and not is_found(step.initial, step.truth) for step in steps
         ),
-        kept=sum(scene.is_right for scene in after) / len(after) if after else math.nan,
+        kept=sum(step.is_right for step in after) / len(after) if after else math.nan,
         rmse_m=float(np.sqrt(np.mean(np.square(metres)))) if len(metres) else math.nan,
         rmse_deg=float(np.sqrt(np.mean(np.square(degrees)))) if len(degrees) else math.nan,
     )

@@ -10,7 +10,7 @@ from firstfix.core.se2 import SE2
 from firstfix.lab.scenarios.phase import Phase, periods
 from firstfix.lab.simulation.people import Manner
 from firstfix.lab.simulation.pilot import Pilot
-from firstfix.lab.simulation.simulation import PERIOD_S, Moment, Stage
+from firstfix.lab.simulation.simulation import PERIOD_S, Moment, Simulation
 
 _BACK_OFF_MPS = -0.15
 _BACK_OFF_S = 1.0
@@ -29,10 +29,10 @@ class Stand(Phase):
 
     seconds: float
 
-    def play(self, stage: Stage) -> Iterator[Moment]:
+    def run(self, simulation: Simulation) -> Iterator[Moment]:
         """Stand."""
         for _ in range(periods(self.seconds)):
-            yield stage.moment("stand")
+            yield simulation.step("stand")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +47,10 @@ class Pause(Phase):
 
     seconds: float
 
-    def play(self, stage: Stage) -> Iterator[Moment]:
+    def run(self, simulation: Simulation) -> Iterator[Moment]:
         """Be silent."""
         for _ in range(periods(self.seconds)):
-            yield stage.silence("pause")
+            yield simulation.step_silently("pause")
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,24 +74,24 @@ class DriveTo(Phase):
         """The goal."""
         return () if self.to is None else (self.to,)
 
-    def play(self, stage: Stage) -> Iterator[Moment]:
+    def run(self, simulation: Simulation) -> Iterator[Moment]:
         """Drive; after a bump go back a little and plan anew."""
-        here = stage.robot.T_map_base
-        goal = stage.planner.random_goal(here, stage.rng) if self.to is None else self.to
-        pilot = Pilot(stage.planner.path(here, goal))
+        here = simulation.robot.T_map_base
+        goal = simulation.planner.random_goal(here, simulation.rng) if self.to is None else self.to
+        pilot = Pilot(simulation.planner.path(here, goal))
         back_off = 0
         for _ in range(periods(self.seconds)):
             if pilot.arrived:
                 break
-            if back_off == 0 and stage.robot.bumped:
+            if back_off == 0 and simulation.robot.bumped:
                 back_off = periods(_BACK_OFF_S)
             if back_off == 0:
-                yield stage.moment("drive", pilot.command)
+                yield simulation.step("drive", pilot.command)
                 continue
-            yield stage.moment("drive", lambda _: (_BACK_OFF_MPS, 0.0))
+            yield simulation.step("drive", lambda _: (_BACK_OFF_MPS, 0.0))
             back_off -= 1
             if back_off == 0:
-                pilot = Pilot(stage.planner.path(stage.robot.T_map_base, goal))
+                pilot = Pilot(simulation.planner.path(simulation.robot.T_map_base, goal))
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,14 +106,14 @@ class Wander(Phase):
 
     seconds: float
 
-    def play(self, stage: Stage) -> Iterator[Moment]:
+    def run(self, simulation: Simulation) -> Iterator[Moment]:
         """Drive until time is over."""
-        end = stage.stamp + self.seconds - PERIOD_S / 2.0
-        while stage.stamp < end:
-            before = stage.stamp
-            yield from DriveTo(seconds=end - before).play(stage)
-            if stage.stamp == before:  # in a nook, where every goal is at hand
-                yield stage.moment("drive")
+        end = simulation.stamp + self.seconds - PERIOD_S / 2.0
+        while simulation.stamp < end:
+            before = simulation.stamp
+            yield from DriveTo(seconds=end - before).run(simulation)
+            if simulation.stamp == before:  # in a nook, where every goal is at hand
+                yield simulation.step("drive")
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,12 +128,12 @@ class Spin(Phase):
 
     radians: float
 
-    def play(self, stage: Stage) -> Iterator[Moment]:
+    def run(self, simulation: Simulation) -> Iterator[Moment]:
         """Turn at a steady speed, and stop."""
         turn = math.copysign(_SPIN_RADPS, self.radians)
         for _ in range(periods(abs(self.radians) / _SPIN_RADPS)):
-            yield stage.moment("spin", lambda _: (0.0, turn))
-        yield stage.moment("spin")
+            yield simulation.step("spin", lambda _: (0.0, turn))
+        yield simulation.step("spin")
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,8 +154,8 @@ class Crowd(Phase):
     seconds: float = 0.0
     manner: Manner = Manner.SURROUND
 
-    def play(self, stage: Stage) -> Iterator[Moment]:
+    def run(self, simulation: Simulation) -> Iterator[Moment]:
         """Let them come and stand among them."""
-        stage.people.come(self.count, self.manner, stage.robot.T_map_base)
+        simulation.people.come(self.count, self.manner, simulation.robot.T_map_base)
         for _ in range(periods(self.seconds)):
-            yield stage.moment("crowd")
+            yield simulation.step("crowd")

@@ -6,14 +6,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 
 from firstfix.core.se2 import SE2
-from firstfix.lab.simulation.simulation import PERIOD_S, Moment, Stage
+from firstfix.lab.simulation.simulation import PERIOD_S, Moment, Simulation
 
 
 class Phase(ABC):
     """A part of a scenario."""
 
     @abstractmethod
-    def play(self, stage: Stage) -> Iterator[Moment]:
+    def run(self, simulation: Simulation) -> Iterator[Moment]:
         """Move the stage on to the end of the phase, scan by scan; a phase may take no time."""
 
     @property

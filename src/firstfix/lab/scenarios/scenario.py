@@ -15,7 +15,7 @@ from firstfix.lab.simulation.floor import Floor
 from firstfix.lab.simulation.furniture import furnished
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.simulation.robot import Kobuki
-from firstfix.lab.simulation.simulation import Moment, Shutter, Stage
+from firstfix.lab.simulation.simulation import Moment, Shutter, Simulation
 from firstfix.lab.worlds.catalog import random_free_pose
 
 
@@ -73,12 +73,12 @@ def run(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Iterator[Moment]:
     InputError
         If the robot shall begin, or be put, where it does not fit, or drive where no way leads.
     """
-    stage = set_stage(scenario, grid, seed)
+    simulation = start_simulation(scenario, grid, seed)
     for phase in scenario.phases:
-        yield from phase.play(stage)
+        yield from phase.run(simulation)
 
 
-def set_stage(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Stage:
+def start_simulation(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Simulation:
     """Prepare a scenario: the robot stands at its beginning, and nothing has happened yet.
 
     Parameters
@@ -92,7 +92,7 @@ def set_stage(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Stage:
 
     Returns
     -------
-    Stage
+    Simulation
         Ready to be played on.
 
     Raises
@@ -100,7 +100,7 @@ def set_stage(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Stage:
     InputError
         As `run`.
     """
-    for_building, for_stage = np.random.SeedSequence(seed).spawn(2)
+    for_building, for_simulation = np.random.SeedSequence(seed).spawn(2)
     rng = np.random.default_rng(for_building)
     start = scenario.start if scenario.start is not None else random_free_pose(grid, rng)
     if scenario.furniture:
@@ -109,7 +109,9 @@ def set_stage(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Stage:
     floor = Floor(grid)
     for place in (start, *(place for phase in scenario.phases for place in phase.places)):
         check_room(floor, place, scenario.kobuki.radius_m)
-    return Stage(floor, scenario.kobuki, scenario.lidar, scenario.shutter, start, for_stage)
+    return Simulation(
+        floor, scenario.kobuki, scenario.lidar, scenario.shutter, start, for_simulation
+    )
 
 
 def check_room(floor: Floor, place: SE2, radius_m: float) -> None:

@@ -85,7 +85,7 @@ def at_rest(T_map_base: SE2) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-class Stage:
+class Simulation:
     """The state of a running simulation.
 
     Parameters
@@ -130,7 +130,7 @@ class Stage:
         """Note what has just happened, for the next moment."""
         self._disturbance = by
 
-    def moment(
+    def step(
         self, phase: str, command: Command = at_rest, hands: NDArray[np.float64] = NOBODY
     ) -> Moment:
         """Go on to the next scan.
@@ -172,7 +172,7 @@ class Stage:
         events.insert(beginning, scan)
         return self._end(stamp, events, T_map_base, phase)
 
-    def silence(self, phase: str) -> Moment:
+    def step_silently(self, phase: str) -> Moment:
         """Go on as far, with nothing reported at all."""
         stamp, T_map_base = self.stamp, self.robot.T_map_base
         for _ in range(_STEPS):

@@ -2,11 +2,11 @@
 
 The filter is the same in all columns, and so are seed, start and settings (Nav2's defaults); only
 the likelihood of a scan is made otherwise of those of its beams: the product counted as 8, 15, 30
-or 60 independent witnesses (firstfix: 15), and AMCL's one plus the sum of cubes. A line has, for
+or 60 effective beams (firstfix: 15), and AMCL's one plus the sum of cubes. A line has, for
 each: APE RMSE (m), share of scans kept (0.5 m, 10 degrees), and share of updates whose truth lies
 within the 3-sigma ellipsoid of the estimate, which an honest belief holds in 97 %.
 
-    python benchmarks/witnesses.py ../shared/cases/*/ [--seeds 2]
+    python benchmarks/effective_beams.py ../shared/cases/*/ [--seeds 2]
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from firstfix.io.maps.map_server import load_map
 from firstfix.lab.experiments.drive import Drive, plan_drive
 from firstfix.lab.experiments.drive_tracking import TRUE_START, follow_drive
 
-WITNESSES = (8, 15, 30, 60)
+EFFECTIVE_BEAMS = (8, 15, 30, 60)
 CHI2_3SIGMA = 14.16
 
 
@@ -63,7 +63,7 @@ def main() -> None:
     parser.add_argument("folders", type=Path, nargs="+", help="folders with map.yaml, scans.npz")
     parser.add_argument("--seeds", type=int, default=1)
     arguments = parser.parse_args()
-    names = [f"{n} witnesses" for n in WITNESSES] + ["sum of cubes"]
+    names = [f"{n} effective beams" for n in EFFECTIVE_BEAMS] + ["sum of cubes"]
     print(f"{'case':24s}" + "".join(f"{name:>24s}" for name in names))
     for folder in arguments.folders:
         recording = load_recording(folder / "scans.npz")
@@ -71,7 +71,7 @@ def main() -> None:
             continue
         grid, drive = load_map(folder / "map.yaml"), plan_drive(recording, None)
         for seed in range(arguments.seeds):
-            cells = [judged(grid, drive, LikelihoodField, n, seed) for n in WITNESSES]
+            cells = [judged(grid, drive, LikelihoodField, n, seed) for n in EFFECTIVE_BEAMS]
             cells.append(judged(grid, drive, SumOfCubes, None, seed))
             print(f"{folder.name:24s}" + "".join(f"{cell:>24s}" for cell in cells), flush=True)
 
@@ -80,14 +80,14 @@ def judged(
     grid: OccupancyGrid,
     drive: Drive,
     model: type[LikelihoodField],
-    witnesses: int | None,
+    effective_beams: int | None,
     seed: int,
 ) -> str:
     config = AmclConfig()
     sensor: Sensor = model(grid, config)
     tracker = track_module.Tracker(sensor, config, lambda _, n, __: np.empty((n, 3)))
-    # As many witnesses as beams: no tempering, for AMCL's way of combining them.
-    count = witnesses or config.max_beams
+    # As many effective beams as beams: no tempering, for AMCL's way of combining them.
+    count = effective_beams or config.max_beams
     errors, headings, inside = [], [], []
     with mock.patch.object(sensor_module, "INDEPENDENT_BEAMS", count):
         rng = np.random.default_rng(seed)

@@ -1,7 +1,7 @@
-"""The witnesses of `soak.py`: what a node of ROS 1 says, and what its page shows, as lines of JSON.
+"""The observers of `soak.py`: what a node of ROS 1 says, and what its page shows, as lines of JSON.
 
-python benchmarks/soak_witness.py ros FILE
-python benchmarks/soak_witness.py page FILE WEBSOCKET_URL
+python benchmarks/soak_observer.py ros FILE
+python benchmarks/soak_observer.py page FILE WEBSOCKET_URL
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def listen(lines: Lines) -> None:
             told = to_pose(message)
             lines.write(topic=topic, at=at, stamp=told.stamp, pose=planar(told))
 
-    rospy.init_node("witness")
+    rospy.init_node("observer")
     for topic, kind in TOPICS.items():
         rospy.Subscriber(topic, message_class(kind), partial(hear, topic), tcp_nodelay=True)
     stay_known()
