@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from firstfix.core.odometry import Signal, SignalKind
 from firstfix.core.se2 import SE2
 from firstfix.localizer.inputs import PoseHint
 from firstfix.localizer.outputs import Status
@@ -23,11 +24,11 @@ def in_words(outputs):
 def test_who_said_it_is_in_the_status(robot_in, hall_plan):
     robot = robot_in(hall_plan, SE2(4.0, 3.0, 1.0))
     told = robot.tell(PoseHint(robot.stamp, robot.pose, "the saved pose"))
-    assert in_words(told) == ["the saved pose says where; the next scan will tell"]
-    assert in_words(robot.tick())[0].startswith("the saved pose said where; ")
+    assert in_words(told) == ["the saved pose proposes a pose: the next scan will verify it"]
+    assert in_words(robot.tick())[0].startswith("the saved pose proposed this pose; ")
     robot.tell(PoseHint(robot.stamp, SE2(1.0, 2.0, 2.0), "the saved pose"))
     assert in_words(robot.tick()) == [
-        "the saved pose said where, but the scan fits elsewhere, or nowhere: searching"
+        "the pose proposed by the saved pose does not explain the scan: searching"
     ]
 
 
@@ -49,8 +50,8 @@ def test_a_scan_that_says_nothing_is_no_proof_and_the_hint_waits(
     robot.tell(PoseHint(robot.stamp, IN_ROOM_1))
     outputs = robot.ticks(3, damage=with_ranges(lambda scan: ranges))
     assert poses(outputs) == []
-    assert in_words(outputs) == ["a person says where; the sensor sees too little to tell"] * 3
-    assert robot.localizer.state is State.TRACKING
+    assert in_words(outputs) == ["a person proposes a pose; the sensor sees too little to verify it"] * 3
+    assert robot.localizer.state is State.VERIFYING_HINT
     assert is_at(poses(robot.tick())[0].T_map_base, IN_ROOM_1)
 
 
@@ -74,3 +75,16 @@ def test_a_hint_that_is_a_little_off_is_put_right(robot_in, office, office_poses
         off = SE2(*rng.uniform([-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]))
         robot.tell(PoseHint(robot.stamp, truth @ off))
         assert is_at(poses(robot.tick())[0].T_map_base, truth)
+
+
+def test_a_hint_given_in_the_air_is_verified_after_the_robot_is_set_down(
+    robot_in, three_rooms, poses, is_at
+):
+    robot = robot_in(three_rooms, IN_ROOM_1)
+    for active in (True, False):
+        robot.tell(Signal(robot.stamp, SignalKind.WHEEL_DROP, active=active))
+        if active:
+            robot.tell(PoseHint(robot.stamp, IN_ROOM_1))
+            assert robot.localizer.state is State.LIFTED
+    assert robot.localizer.state is State.VERIFYING_HINT
+    assert is_at(poses(robot.tick())[0].T_map_base, IN_ROOM_1)

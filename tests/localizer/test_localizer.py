@@ -104,7 +104,7 @@ def test_twins_are_told_and_none_is_published(robot_in, three_rooms, of, kinds, 
     robot = robot_in(three_rooms, IN_A_ROOM)
     outputs = robot.tick()
     assert kinds(outputs) == [Hypotheses, Status]  # no motion inside would help
-    assert robot.localizer.state is State.TRACKING
+    assert robot.localizer.state is State.DISAMBIGUATING
     rooms = [place.pose.x - IN_A_ROOM.x for place in outputs[0].places if place.probability > 0.1]
     assert sorted(round(x) for x in rooms) == [-8, 0, 8]
     assert sum(place.probability for place in outputs[0].places) == pytest.approx(1.0, abs=0.05)

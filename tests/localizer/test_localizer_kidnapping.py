@@ -1,4 +1,4 @@
-"""Who is lifted, carried, pushed or beamed away is found again, and no wrong pose is published."""
+"""A robot that is lifted, carried, pushed or teleported is found again; no wrong pose is published."""
 
 from __future__ import annotations
 
@@ -20,20 +20,21 @@ A_STEP, A_TURN = SE2(0.05, 0.0, 0.05), SE2(0.0, 0.0, 0.1)
 
 
 @pytest.mark.parametrize("kind", [SignalKind.WHEEL_DROP, SignalKind.PICKED_UP, SignalKind.CLIFF])
-def test_who_is_lifted_says_nothing_until_set_down_and_then_where(in_hall, kind, kinds, is_at):
+def test_a_lifted_robot_publishes_nothing_until_it_is_set_down(in_hall, kind, kinds, is_at):
     (status,) = in_hall.tell(Signal(in_hall.stamp, kind, active=True))
-    assert status.state is State.SEARCHING
+    assert status.state is State.LIFTED
     assert kind.value in status.reason
     assert in_hall.localizer.particles is None
     in_hall.pose = THERE
     assert in_hall.ticks(20) == []
-    assert in_hall.tell(Signal(in_hall.stamp, kind, active=False)) == []
+    (status,) = in_hall.tell(Signal(in_hall.stamp, kind, active=False))
+    assert status.state is State.SEARCHING
     outputs = in_hall.tick()
     assert kinds(outputs) == [InitialPose, TrackedPose, Status]
     assert is_at(outputs[0].T_map_base, THERE)
 
 
-def test_a_robot_stands_when_the_last_of_its_sensors_says_so(in_hall, kinds):
+def test_a_robot_is_set_down_when_the_last_of_its_sensors_is_released(in_hall, kinds):
     for kind in (SignalKind.CLIFF, SignalKind.WHEEL_DROP):
         in_hall.tell(Signal(in_hall.stamp, kind, active=True))
     in_hall.tell(Signal(in_hall.stamp, SignalKind.CLIFF, active=False))
@@ -48,12 +49,15 @@ def test_a_bumper_is_no_kidnapping(in_hall, kinds):
         assert kinds(in_hall.tick()) == [TrackedPose, Status]
 
 
-def test_who_hangs_in_the_air_when_the_map_comes_is_not_searched(hall_plan, robot_in, poses):
+def test_a_robot_in_the_air_is_not_searched_for_when_its_map_arrives(hall_plan, robot_in, poses):
     robot = robot_in(hall_plan, HERE)
     robot.localizer = Localizer()
     robot.tell(Signal(99.0, SignalKind.WHEEL_DROP, active=True))
     robot.tell(NewMap(99.5, hall_plan))
+    assert robot.localizer.state is State.LIFTED
     assert poses(robot.ticks(3)) == []
+    robot.tell(Signal(robot.stamp, SignalKind.WHEEL_DROP, active=False))
+    assert poses(robot.tick()) != []
 
 
 def test_a_scan_from_the_hands_is_not_used_after_the_robot_is_set_down(in_hall, poses):

@@ -17,7 +17,7 @@ from firstfix.localizer import localizer as module
 from firstfix.localizer.inputs import NewMap, Reset
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import InitialPose, Status
-from firstfix.localizer.states import State, after
+from firstfix.localizer.states import State, next_state
 
 HERE = SE2(4.0, 3.0, 1.0)  # where `in_hall` stands
 A_STEP = SE2(0.05, 0.0, 0.05)
@@ -73,10 +73,10 @@ def test_only_the_table_changes_states(maps_cache, story, monkeypatch, of, poses
     steps = []
 
     def spy(state, event):
-        steps.append((state, after(state, event)))
+        steps.append((state, next_state(state, event)))
         return steps[-1][1]
 
-    monkeypatch.setattr(module, "after", spy)
+    monkeypatch.setattr(module, "next_state", spy)
     localizer, state = Localizer(cache_dir=maps_cache), State.NO_MAP
     for event in story:
         outputs = localizer.handle(event)

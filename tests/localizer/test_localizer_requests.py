@@ -106,7 +106,7 @@ def test_a_right_hint_decides_between_twins(robot_in, three_rooms, kinds, is_at)
 def test_a_hint_may_come_before_odometry(robot_in, hall_plan, of, is_at):
     robot = robot_in(hall_plan, HERE)
     (status,) = robot.tell(PoseHint(robot.stamp, HERE @ SE2(0.3, 0.3, 0.3)))
-    assert status.state is State.TRACKING
+    assert status.state is State.VERIFYING_HINT
     outputs = robot.tick()
     assert is_at(of(InitialPose, outputs)[0].T_map_base, HERE)
 
@@ -116,7 +116,7 @@ def test_a_wrong_hint_costs_one_scan(in_hall, hint, kinds, is_at):
     in_hall.tell(PoseHint(in_hall.stamp, hint))
     (status,) = in_hall.tick()
     assert status.state is State.SEARCHING
-    assert "fits elsewhere, or nowhere" in status.reason
+    assert "does not explain the scan" in status.reason
     outputs = in_hall.tick()
     assert kinds(outputs) == [InitialPose, TrackedPose, Status]
     assert is_at(outputs[0].T_map_base, HERE)

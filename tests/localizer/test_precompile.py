@@ -56,7 +56,7 @@ for world in (office(), identical_rooms(2)):
         states.add(localizer.state)
     handle(localizer, PoseHint(stamp, pose))
     handle(localizer, lidar.scan(world, pose, rng, stamp))
-assert states == {State.TRACKING, State.LOCALIZED}, states
+assert states == {State.DISAMBIGUATING, State.LOCALIZED}, states
 assert not late, late
 """
 

@@ -334,7 +334,7 @@ IN_ROOM_1 = SE2(8.0 + 4.7, 3.6, -2.4)
 def test_in_a_building_of_equal_rooms_a_restarted_node_knows_its_room(ros2, file):
     robot = Speaker(ros2, identical_rooms(3), IN_ROOM_1)
     with Life(ros2, robot, file) as first:
-        assert first.state is State.TRACKING  # nobody could know
+        assert first.state is State.DISAMBIGUATING  # nobody could know
         person = pose_with_covariance(ros2.make, 0.0, "map", IN_ROOM_1, np.eye(3))
         first.hear(Heard.INITIAL_POSE, person)
         first.look()

@@ -144,7 +144,7 @@ def test_picking_a_place_resolves_an_ambiguous_start(
     page = visit(rooms_server.url)
     page.wait_for_map()
     page.page.keyboard.press("r")
-    page.wait_for_state("AMBIGUOUS")
+    page.wait_for_state("DISAMBIGUATING")
     page.page.keyboard.press(" ")
     page.page.wait_for_selector("#paused", state="visible")
     places = rooms_server.status()["hypotheses"]

@@ -149,7 +149,7 @@ def test_axe_finds_no_serious_fault(
     server: Server = request.getfixturevalue(f"{world}_server")
     page = visit(server.url, device, color_scheme=scheme, bypass_csp=True)
     page.wait_for_map()
-    page.wait_for_state("LOCALIZED" if world == "office" else "AMBIGUOUS")
+    page.wait_for_state("LOCALIZED" if world == "office" else "DISAMBIGUATING")
     if device is PHONE:
         faults = serious_faults(page)
         page.page.tap("#sheet-handle")

@@ -71,7 +71,7 @@ def test_a_lifted_robot_is_nowhere_and_its_time_counts_from_when_it_stands():
     begun.step(10)
     view = begun.store.snapshot
     assert (view.pose, view.scan, view.particles, view.hypotheses) == (None, None, None, ())
-    assert view.state is State.SEARCHING
+    assert view.state is State.LIFTED
     begun.step(32)
     assert begun.store.snapshot.pose.distance_to(pose) < 0.1
     assert begun.store.snapshot.time_to_fix_s < 2.0
@@ -82,7 +82,7 @@ def test_several_places_are_shown_with_the_scan_at_the_first():
     begun = drive("rooms")
     begun.step(ASLEEP + 1)
     view = begun.store.snapshot
-    assert view.state is State.TRACKING
+    assert view.state is State.DISAMBIGUATING
     assert view.pose is None
     assert len(view.hypotheses) >= 4
     assert view.scan.T_map_base == view.hypotheses[0].pose

@@ -28,7 +28,7 @@ from firstfix.localizer.odometry_buffer import OdometryBuffer
 from firstfix.localizer.outputs import Hypotheses, InitialPose, Output, Status, TrackedPose
 from firstfix.localizer.pose_monitor import Finding, Watch
 from firstfix.localizer.relocation import Candidates, moved_on, same_place
-from firstfix.localizer.states import Event, State, after
+from firstfix.localizer.states import Event, State, next_state
 
 # The covariance of the static stage is that of one scan in a perfect map; a track begins wider.
 _BEGIN_COVARIANCE = np.diag([0.03**2, 0.03**2, np.radians(1.0) ** 2])
@@ -66,7 +66,7 @@ class Localizer:
         self, config: LocalizerConfig | None = None, cache_dir: Path | None = None
     ) -> None:
         self.config = config or LocalizerConfig()
-        self.state = State.NO_MAP
+        self._state = State.NO_MAP
         self._cache_dir = cache_dir
         self._rng = np.random.default_rng(self.config.amcl.seed)
         self._odometry = OdometryBuffer()
@@ -88,6 +88,11 @@ class Localizer:
         self._contest: Contest
 
     @property
+    def state(self) -> State:
+        """The state; only events in the table of `firstfix.localizer.states` change it."""
+        return self._state
+
+    @property
     def particles(self) -> Particles | None:
         """The belief; None while there is none."""
         return self._track.state.particles if self._track is not None else None
@@ -95,7 +100,7 @@ class Localizer:
     @property
     def matcher(self) -> ScanMatcher | None:
         """The static stage on the map in use; None before the first map."""
-        return None if self.state is State.NO_MAP else self._matcher
+        return None if self._state is State.NO_MAP else self._matcher
 
     def handle(self, given: Input) -> list[Output]:
         """Take in what happened.
@@ -123,16 +128,17 @@ class Localizer:
             return self._take_odometry(given)
         if isinstance(given, Signal):
             return self._take_signal(given)
-        if self.state is State.NO_MAP:
-            return [Status(given.stamp, self.state, "no map yet")]
+        if self._state is State.NO_MAP:
+            return [Status(given.stamp, self._state, "no map yet")]
         if isinstance(given, LaserScan):
             self._waiting.append(given)
             return self._take_waiting_scan()
         if isinstance(given, PoseHint):
             return self._take_hint(given)
         if isinstance(given, Reset):
-            self._lifted.clear()  # of a base that was restarted in the air, nobody hears it land
-            return [self._forget(given.stamp, Event.RESET, "told to search anew")]
+            # A base that was restarted in the air never reports that it was set down.
+            self._lifted.clear()
+            return [self._forget(given.stamp, Event.RESET, "reset requested: searching")]
         return self._take_update_request(given)
 
     # ---- inputs
@@ -142,7 +148,11 @@ class Localizer:
         sensor = build_sensor(given.grid, self.config.amcl)
         self._matcher = matcher
         self._tracker = Tracker(sensor, self.config.amcl, self._no_injection)
-        return [self._forget(given.stamp, Event.MAP_CAME, "a map came: searching")]
+        status = self._forget(given.stamp, Event.MAP_RECEIVED, "map received: searching")
+        if not self._lifted:
+            return [status]
+        reason = "map received: waiting until the robot is set down"
+        return [self._forget(given.stamp, Event.PICKED_UP, reason)]
 
     def _take_odometry(self, given: Odometry) -> list[Output]:
         before = self._odometry.last
@@ -159,31 +169,39 @@ class Localizer:
         if not given.kind.means_lifted:
             return []
         if not given.active:
-            self._lifted.discard(given.kind)
-            self._stands_since = given.stamp
-            self._waiting.clear()  # taken in somebody's hands
-            return []
+            return self._take_release(given)
         self._lifted.add(given.kind)
-        if self.state is State.NO_MAP:
+        if self._state is State.NO_MAP:
             return []
-        reason = f"{given.kind.value}: waiting until the robot stands again, then searching"
-        return [self._forget(given.stamp, Event.KIDNAPPED, reason)]
+        reason = f"{given.kind.value}: waiting until the robot is set down"
+        return [self._forget(given.stamp, Event.PICKED_UP, reason)]
+
+    def _take_release(self, given: Signal) -> list[Output]:
+        self._lifted.discard(given.kind)
+        self._stands_since = given.stamp
+        self._waiting.clear()  # scans taken in the air
+        if self._lifted or self._state is not State.LIFTED:
+            return []
+        self._fire(Event.SET_DOWN)
+        if self._hint is not None:
+            self._fire(Event.HINT_RECEIVED)
+        return [Status(given.stamp, self._state, "set down: waiting for the next scan")]
 
     def _take_hint(self, given: PoseHint) -> list[Output]:
         self._track = None
         self._hint = given
-        self.state = after(self.state, Event.PERSON_SAID)
-        reason = f"{given.source} says where; the next scan will tell"
-        return [Status(given.stamp, self.state, reason)]
+        self._fire(Event.HINT_RECEIVED)
+        reason = f"{given.source} proposes a pose: the next scan will verify it"
+        return [Status(given.stamp, self._state, reason)]
 
     def _take_update_request(self, given: NoMotionUpdate) -> list[Output]:
         self._update_asked = True
         self._found_nothing_at = None
-        return [Status(given.stamp, self.state, "the next scan will be used in any case")]
+        return [Status(given.stamp, self._state, "the next scan will be used in any case")]
 
     def _take_waiting_scan(self) -> list[Output]:
         last = self._odometry.last
-        if last is None or self.state is State.NO_MAP:
+        if last is None or self._state is State.NO_MAP:
             return []
         reached = [scan for scan in self._waiting if scan.stamp <= last.stamp]
         if not reached:
@@ -194,12 +212,14 @@ class Localizer:
         T_odom_base = self._odometry.at(scan.stamp)
         if T_odom_base is None:
             reason = "a scan is older than the odometry that is known: left out"
-            return [Status(scan.stamp, self.state, reason)]
+            return [Status(scan.stamp, self._state, reason)]
         if self._lifted or scan.stamp < self._stands_since:
             return []
-        if self.state is State.SEARCHING:
+        if self._state is State.SEARCHING:
             return self._search(scan, T_odom_base)
-        if self.state is State.TRACKING:
+        if self._state is State.VERIFYING_HINT:
+            return self._verify_hint(scan, T_odom_base)
+        if self._state is State.DISAMBIGUATING:
             return self._decide(scan, T_odom_base)
         return self._follow(scan, T_odom_base)
 
@@ -214,20 +234,18 @@ class Localizer:
         if best is None or result.verdict is Verdict.NO_MATCH:
             self._found_nothing_at = scan.stamp, T_odom_base
             evidence = best.evidence if best is not None else None
-            return [Status(scan.stamp, self.state, result.reason, evidence)]
+            return [Status(scan.stamp, self._state, result.reason, evidence)]
         if result.verdict is Verdict.UNIQUE:
             if not self._believable(T_odom_base, best):
                 reason = "one place fits, far from where the track was lost: waiting for more"
-                return [Status(scan.stamp, self.state, reason, best.evidence)]
-            return self._arrive(scan, T_odom_base, best, Event.ONE_PLACE, result.reason)
+                return [Status(scan.stamp, self._state, reason, best.evidence)]
+            return self._arrive(scan, T_odom_base, best, Event.ONE_PLACE_FITS, result.reason)
         self._contest = Contest(result.hypotheses, T_odom_base, self._matcher, self.config.watch)
         self._looked_at = scan.stamp
-        self.state = after(self.state, Event.SEVERAL_PLACES)
+        self._fire(Event.SEVERAL_PLACES_FIT)
         return self._tell_places(scan, result.reason)
 
     def _decide(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
-        if self._hint is not None:
-            return self._check_hint(scan, T_odom_base, self._hint)
         if self._contest.brings_news(T_odom_base) or self._update_asked:
             standing = self._contest.look(scan, T_odom_base)
         elif not 0.0 <= scan.stamp - self._looked_at < self.config.watch.look_again_s:
@@ -238,18 +256,20 @@ class Localizer:
         best = self._contest.places[0]
         if standing is Standing.WON:
             reason = f"one place has won; {best.evidence.explained:.0%} of the beams fit there"
-            return self._arrive(scan, T_odom_base, best, Event.PLACE_WON, reason)
+            return self._arrive(scan, T_odom_base, best, Event.DECIDED, reason)
         if standing is Standing.LOST:
-            reason = "the scans fit none of the places that were left: searching anew"
-            return [self._forget(scan.stamp, Event.LOST, reason)]
+            reason = "no remaining place explains the scans: searching"
+            return [self._forget(scan.stamp, Event.CONTRADICTED, reason)]
         left = len(self._contest.places)
         reason = f"{left} places left, the best at {best.probability:.0%}; motion would decide"
         return self._tell_places(scan, reason)
 
-    def _check_hint(self, scan: LaserScan, T_odom_base: SE2, hint: PoseHint) -> list[Output]:
+    def _verify_hint(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
+        hint = self._hint
+        assert hint is not None  # noqa: S101 - every way into this state brings one
         if np.count_nonzero(usable_beams(scan).hit) < FEWEST_HITS:
-            reason = f"{hint.source} says where; the sensor sees too little to tell"
-            return [Status(scan.stamp, self.state, reason)]
+            reason = f"{hint.source} proposes a pose; the sensor sees too little to verify it"
+            return [Status(scan.stamp, self._state, reason)]
         self._hint = None
         place = self._matcher.search_locally(scan, hint.T_map_base)
         result = self._matcher.locate(scan)
@@ -259,10 +279,10 @@ class Localizer:
         as_good = place.score <= _AS_GOOD * max(best.score, _GOOD_COST)
         if as_good and not elsewhere and place.score <= self.config.watch.doubtful_cost:
             fit = f"{place.evidence.explained:.0%} of the beams fit there"
-            reason = f"{hint.source} said where; {fit}"
-            return self._arrive(scan, T_odom_base, place, Event.PLACE_WON, reason)
-        reason = f"{hint.source} said where, but the scan fits elsewhere, or nowhere: searching"
-        return [self._forget(scan.stamp, Event.LOST, reason, place.evidence)]
+            reason = f"{hint.source} proposed this pose; {fit}"
+            return self._arrive(scan, T_odom_base, place, Event.HINT_CONFIRMED, reason)
+        reason = f"the pose proposed by {hint.source} does not explain the scan: searching"
+        return [self._forget(scan.stamp, Event.HINT_REJECTED, reason, place.evidence)]
 
     def _follow(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
         track = self._move(scan, T_odom_base)
@@ -272,16 +292,16 @@ class Localizer:
             if same_place(look.place.pose, T_map_base, self.config.watch):
                 return self._correct(scan, T_odom_base, look.place)
             reason = f"found {look.place.pose.distance_to(T_map_base):.1f} m from the track"
-            return self._arrive(scan, T_odom_base, look.place, Event.FOUND_ELSEWHERE, reason)
+            return self._arrive(scan, T_odom_base, look.place, Event.RELOCALIZED, reason)
         evidence = look.place.evidence
         if look.finding is Finding.CONTRADICTED:
             reason = f"only {evidence.explained:.0%} of the beams fit here, for too long: searching"
-            return [self._forget(scan.stamp, Event.LOST, reason, evidence)]
+            return [self._forget(scan.stamp, Event.CONTRADICTED, reason, evidence)]
         said = f"{evidence.explained:.0%} of the beams fit"
         self._has_leapt &= look.finding is not Finding.FITS
         if self._has_leapt:
             reason = f"odometry has leapt, and only {said} since: waiting for more"
-            return [Status(scan.stamp, self.state, reason, evidence)]
+            return [Status(scan.stamp, self._state, reason, evidence)]
         reason = {
             Finding.FITS: said,
             Finding.SILENT: "the sensor sees too little to tell: going on by odometry",
@@ -289,7 +309,7 @@ class Localizer:
         covariance = track.state.estimate.covariance
         return [
             TrackedPose(scan.stamp, T_map_base, covariance, track.T_map_odom),
-            Status(scan.stamp, self.state, reason, evidence),
+            Status(scan.stamp, self._state, reason, evidence),
         ]
 
     # ---- steps
@@ -299,17 +319,17 @@ class Localizer:
     ) -> list[Output]:
         """Tell that the robot is found, and follow from there."""
         tracked = self._settle(scan, T_odom_base, place)
-        self.state = after(self.state, event)
+        self._fire(event)
         return [
             InitialPose(scan.stamp, place.pose, tracked.covariance),
             tracked,
-            Status(scan.stamp, self.state, reason, place.evidence),
+            Status(scan.stamp, self._state, reason, place.evidence),
         ]
 
     def _correct(self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis) -> list[Output]:
         """Put a track right that is a little off; the robot was neither lost nor found."""
         tracked = self._settle(scan, T_odom_base, place)
-        return [tracked, Status(scan.stamp, self.state, "put right", place.evidence)]
+        return [tracked, Status(scan.stamp, self._state, "put right", place.evidence)]
 
     def _settle(self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis) -> TrackedPose:
         """Begin a track at a place."""
@@ -355,7 +375,7 @@ class Localizer:
     def _forget(
         self, stamp: float, event: Event, reason: str, evidence: Evidence | None = None
     ) -> Status:
-        contradicted = event is Event.LOST and self._track is not None
+        contradicted = event is Event.CONTRADICTED and self._track is not None
         self._lost_track = self._track.T_map_odom if contradicted and self._track else None
         self._last_word_at = None
         self._found_nothing_at = None
@@ -363,24 +383,27 @@ class Localizer:
         self._track = None
         self._hint = None
         self._waiting.clear()
-        self.state = after(self.state, event)
-        return Status(stamp, self.state, reason, evidence)
+        self._fire(event)
+        return Status(stamp, self._state, reason, evidence)
+
+    def _fire(self, event: Event) -> None:
+        self._state = next_state(self._state, event)
 
     def _tell_places(self, scan: LaserScan, reason: str) -> list[Output]:
         places = self._contest.places
         motion = deciding_motion(scan, places, self._matcher.fields.grid)
         outputs: list[Output] = [
             Hypotheses(scan.stamp, places),
-            Status(scan.stamp, self.state, reason, places[0].evidence),
+            Status(scan.stamp, self._state, reason, places[0].evidence),
         ]
         return [*outputs, motion] if motion is not None else outputs
 
     def _follow_jump(self, before: Odometry | None, now: Odometry) -> list[Output]:
         """Go on at the same pose in a new odometry frame; the next scan will tell whether."""
-        if self.state is State.TRACKING and self._hint is None:
+        if self._state is State.DISAMBIGUATING:
             # The places moved with the old frame.
-            reason = "odometry jumped before one of several places had won: searching anew"
-            return [self._forget(now.stamp, Event.LOST, reason)]
+            reason = "odometry jumped while several places fit: searching"
+            return [self._forget(now.stamp, Event.ODOMETRY_JUMPED, reason)]
         if self._track is None or before is None:
             return []
         T_map_base = self._track.T_map_odom @ before.T_odom_base

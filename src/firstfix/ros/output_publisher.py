@@ -38,7 +38,9 @@ _REMIND_S = 10.0
 _LEVELS = {
     State.NO_MAP: Level.ERROR,
     State.SEARCHING: Level.WARN,
-    State.TRACKING: Level.WARN,
+    State.DISAMBIGUATING: Level.WARN,
+    State.VERIFYING_HINT: Level.WARN,
+    State.LIFTED: Level.WARN,
     State.LOCALIZED: Level.OK,
 }
 
@@ -144,11 +146,11 @@ class OutputPublisher:
         self._transport.publish(HYPOTHESES, message)
 
     def _announce_status(self, status: Status) -> None:
-        if self._places and status.state is not State.TRACKING:
+        if self._places and status.state is not State.DISAMBIGUATING:
             self._announce_places(status.stamp, [])  # there is one place now, or none
             self._motion = None
         has_changed = status.state is not self._state
-        is_lost = status.state in (State.SEARCHING, State.TRACKING)
+        is_lost = status.state in (State.SEARCHING, State.DISAMBIGUATING)
         if has_changed or (is_lost and _is_due(status.stamp, self._logged_at, _REMIND_S)):
             self._logged_at = status.stamp
             self._transport.log(Severity.INFO, f"{status.state.value}: {status.reason}")

@@ -80,8 +80,7 @@ class SnapshotStore:
 
     def __call__(self, given: Input, outputs: list[Output], localizer: Localizer) -> None:
         """Take down what came in and what it led to; called by the thread that thinks."""
-        is_lifted = self._timeline.is_lifted
-        self._timing.count(given, outputs, self._snapshot.state, is_lifted=is_lifted)
+        self._timing.count(given, outputs, self._snapshot.state)
         with self._lock:
             if isinstance(given, LaserScan):
                 self._scans.append(given)
@@ -128,7 +127,7 @@ class SnapshotStore:
         cleared: dict[str, Any] = {}
         if status.state is not State.LOCALIZED:
             cleared = {"pose": None, "covariance": None, "particles": None}
-        if status.state in {State.SEARCHING, State.NO_MAP}:
+        if status.state in {State.NO_MAP, State.SEARCHING, State.LIFTED}:
             cleared |= {"hypotheses": (), "motion": None, "scan": None}
         self._snapshot = replace(
             self._snapshot,

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from firstfix.core.odometry import Signal, SignalKind
+from firstfix.core.odometry import Signal
 from firstfix.localizer.inputs import Input, NewMap, PoseHint, Reset
 from firstfix.localizer.outputs import InitialPose, Output, Status
 from firstfix.localizer.states import State
 
 MOST_EVENTS = 200
 
-# What changes the state by itself, and has an event of its own.
-_TELLING = (NewMap, PoseHint, Signal)
+# Inputs that change the state and have an event of their own.
+_WITH_OWN_EVENT = (NewMap, PoseHint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +46,6 @@ class Timeline:
         self._next_number = 0
         self._state = State.NO_MAP
         self._found: InitialPose | None = None
-        self._lifted: set[SignalKind] = set()
-
-    @property
-    def is_lifted(self) -> bool:
-        """True while somebody holds the robot."""
-        return bool(self._lifted)
 
     def since(self, number: int) -> list[Event]:
         """Return those whose number is this or more."""
@@ -71,8 +65,6 @@ class Timeline:
         elif isinstance(given, PoseHint):
             at = given.T_map_base
             self.note(given.stamp, "hint", f"somebody says: at ({at.x:.2f}, {at.y:.2f}) m")
-        elif isinstance(given, Signal) and given.kind.means_lifted:
-            self._note_lift(given)
 
     def note_output(self, given: Input, output: Output) -> None:
         """Add what an input led to, if that is news."""
@@ -84,7 +76,9 @@ class Timeline:
                 at, self._found = self._found.T_map_base, None
                 where = f"({at.x:.2f}, {at.y:.2f}) m"
                 self.note(output.stamp, "found", f"found at {where}: {output.reason}")
-            elif before is not output.state and not isinstance(given, _TELLING):
+            elif before is not output.state and State.LIFTED in (before, output.state):
+                self._note_lift(given, output)
+            elif before is not output.state and not isinstance(given, _WITH_OWN_EVENT):
                 self._note_change(given, before, output)
 
     def _note_change(self, given: Input, before: State, status: Status) -> None:
@@ -93,11 +87,9 @@ class Timeline:
         kind = "lost" if was_lost else "state"
         self.note(status.stamp, kind, f"{status.state.value}: {status.reason}")
 
-    def _note_lift(self, signal: Signal) -> None:
-        was_lifted = self.is_lifted
-        (self._lifted.add if signal.active else self._lifted.discard)(signal.kind)
-        if self.is_lifted and not was_lifted:
-            words = signal.kind.value.replace("_", " ")
-            self.note(signal.stamp, "lifted", f"picked up: {words}")
-        elif was_lifted and not self.is_lifted:
-            self.note(signal.stamp, "lifted", "set down")
+    def _note_lift(self, given: Input, status: Status) -> None:
+        if status.state is State.LIFTED:
+            sensor = given.kind.value.replace("_", " ") if isinstance(given, Signal) else "map"
+            self.note(status.stamp, "lifted", f"picked up: {sensor}")
+        else:
+            self.note(status.stamp, "lifted", "set down")

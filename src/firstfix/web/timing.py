@@ -29,10 +29,10 @@ class TimingStatistics:
         """Processor time for a scan and what came with it, median of the last ones, ms."""
         return 1e3 * statistics.median(self._cpu_s) if self._cpu_s else None
 
-    def count(self, given: Input, outputs: list[Output], state: State, *, is_lifted: bool) -> None:
+    def count(self, given: Input, outputs: list[Output], state: State) -> None:
         """Take down what an input took, and what came of it; ``state`` is that before it."""
         self._spent_s += time.thread_time() - self._left_at_s
-        if is_lifted or state in {State.LOCALIZED, State.NO_MAP}:
+        if state in {State.LOCALIZED, State.NO_MAP, State.LIFTED}:
             self._began = None
         elif isinstance(given, LaserScan) and self._began is None:
             self._began = given.stamp

@@ -259,7 +259,7 @@ def test_a_map_of_other_clients_is_the_same(wire):
 
 
 def test_a_status_says_how_grave_and_what(wire):
-    values = {"state": "TRACKING", "beams": "120"}
+    values = {"state": "DISAMBIGUATING", "beams": "120"}
     message = diagnostics(wire.make, NOW, "firstfix", Level.WARN, "two places fit", values)
     sent = wire.sent(message)
     (status,) = sent.status

@@ -78,7 +78,7 @@ def test_nothing_is_handed_over_where_places_look_alike(dds):
     assert len(offered) > 1
     off = [np.hypot(p.position.x - here[0], p.position.y - here[1]) for p in offered]
     assert min(off) < 0.1
-    wait_for(lambda: "TRACKING" in states(status))
+    wait_for(lambda: "DISAMBIGUATING" in states(status))
     time.sleep(1.0)
     assert poses.heard == []
     assert node.end() == 0

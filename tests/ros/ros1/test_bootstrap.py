@@ -43,7 +43,7 @@ def test_places_that_look_alike_are_told_instead_of_a_pose(ros1: Lab) -> None:
     watcher = ros1.watch("initialpose", "hypotheses", "localization_status")
     ros1.node()
     robot = ros1.robot("twins")
-    told = watcher.wait_for("localization_status", state="TRACKING")
+    told = watcher.wait_for("localization_status", state="DISAMBIGUATING")
     assert told["level"] == 1
     assert "motion would tell" in told["message"]
     assert len(watcher.wait_for("hypotheses")["places"]) == int(told["hypotheses"]) > 1

@@ -20,7 +20,7 @@ def test_in_one_of_four_equal_rooms_a_node_that_is_restarted_knows_its_room(
     arguments = (f"_saved_pose_file:={file}", "_save_pose_rate:=5.0")
     first = ros1.node(*arguments)
     robot = ros1.robot("twins")
-    watcher.wait_for("localization_status", state="TRACKING")
+    watcher.wait_for("localization_status", state="DISAMBIGUATING")
     assert not watcher.lines("initialpose")
 
     here = ros1.truth_at(watcher.wait_for("scan")["stamp"])

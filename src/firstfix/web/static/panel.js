@@ -37,7 +37,7 @@ export class Panel {
   show(state) {
     this.#state = state;
     this.#heardAt = performance.now();
-    if (words.nameOfState(state) !== this.#shownName) this.#render();
+    if (state.state !== this.#shownName) this.#render();
     else this.#timer ||= setTimeout(() => this.#render(), EVERY_MS);
   }
 
@@ -53,18 +53,18 @@ export class Panel {
   }
 
   #showState(state) {
-    const name = words.nameOfState(state);
+    const name = state.state;
     const { word, icon, verdict } = words.wordsOfState(name);
     byId("app").dataset.state = name;
     setText(byId("state-word"), word);
     byId("state-icon").setAttribute("href", `#${icon}`);
     setText(byId("verdict"), verdict);
     setText(byId("reason"), sentence(state.reason));
-    const places = name === "AMBIGUOUS" ? `${state.hypotheses.length} places` : "";
+    const places = name === "DISAMBIGUATING" ? `${state.hypotheses.length} places` : "";
     setText(byId("state-note"), places);
     byId("state-note").hidden = !places;
     byId("paused").hidden = !state.paused;
-    const advice = state.motion && name === "AMBIGUOUS" ? words.motionText(state.motion) : "";
+    const advice = state.motion && name === "DISAMBIGUATING" ? words.motionText(state.motion) : "";
     setText(byId("advice"), advice);
     byId("advice").hidden = !advice;
     setText(byId("pause-text"), state.paused ? "Go on" : "Pause");

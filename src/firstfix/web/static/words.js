@@ -4,16 +4,11 @@ const STATES = {
   CONNECTING: { word: "CONNECTING", icon: "i-offline", verdict: "Waiting for the robot." },
   NO_MAP: { word: "NO MAP", icon: "i-nomap", verdict: "There is no map to be found in." },
   SEARCHING: { word: "SEARCHING", icon: "i-search", verdict: "No place is known yet." },
-  CHECKING: { word: "CHECKING", icon: "i-search", verdict: "The next scan judges what was said." },
-  AMBIGUOUS: { word: "AMBIGUOUS", icon: "i-ambiguous", verdict: "Several places fit." },
+  VERIFYING_HINT: { word: "VERIFYING HINT", icon: "i-search", verdict: "The next scan judges the hint." },
+  DISAMBIGUATING: { word: "DISAMBIGUATING", icon: "i-ambiguous", verdict: "Several places fit." },
+  LIFTED: { word: "LIFTED", icon: "i-search", verdict: "The robot is in the air." },
   LOCALIZED: { word: "LOCALIZED", icon: "i-localized", verdict: "One place fits." },
 };
-
-/** What people call the state of a message: TRACKING is about several places, or about a hint. */
-export function nameOfState(state) {
-  if (state.state !== "TRACKING") return state.state;
-  return state.hypotheses.length > 1 ? "AMBIGUOUS" : "CHECKING";
-}
 
 export function wordsOfState(name) {
   return STATES[name] ?? { word: name, icon: "i-help", verdict: "" };
