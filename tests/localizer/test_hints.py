@@ -50,7 +50,10 @@ def test_a_scan_that_says_nothing_is_no_proof_and_the_hint_waits(
     robot.tell(PoseHint(robot.stamp, IN_ROOM_1))
     outputs = robot.ticks(3, damage=with_ranges(lambda scan: ranges))
     assert poses(outputs) == []
-    assert in_words(outputs) == ["a person proposes a pose; the sensor sees too little to verify it"] * 3
+    assert (
+        in_words(outputs)
+        == ["a person proposes a pose; the sensor sees too little to verify it"] * 3
+    )
     assert robot.localizer.state is State.VERIFYING_HINT
     assert is_at(poses(robot.tick())[0].T_map_base, IN_ROOM_1)
 

@@ -1,4 +1,4 @@
-"""A robot that is lifted, carried, pushed or teleported is found again; no wrong pose is published."""
+"""A robot that is lifted, carried, pushed or teleported is found again, never at a wrong pose."""
 
 from __future__ import annotations
 

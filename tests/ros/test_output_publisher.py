@@ -48,7 +48,10 @@ def several(stamp, n=2, *, motion=True):
     places = tuple(
         Hypothesis(SE2(8.0 * i, 0.0, 0.0), COVARIANCE, 0.2, 1 / n, EVIDENCE) for i in range(n)
     )
-    outputs = [Hypotheses(stamp, places), Status(stamp, State.DISAMBIGUATING, f"{n} places", EVIDENCE)]
+    outputs = [
+        Hypotheses(stamp, places),
+        Status(stamp, State.DISAMBIGUATING, f"{n} places", EVIDENCE),
+    ]
     return [*outputs, MotionRequest(stamp, 0.5, 1.25, 0.3)] if motion else outputs
 
 
@@ -254,7 +257,10 @@ def test_a_robot_that_is_not_found_is_a_warning_and_one_without_a_map_an_error(r
     states = [Status(float(i), state, "so it is") for i, state in enumerate(State)]
     announced(recorder, FULL, *([status] for status in states))
     levels = {status_values(m)["state"]: m.status[0].level for m in recorder.on(STATUS)}
-    assert levels == dict.fromkeys((state.value for state in State), 1) | {"NO_MAP": 2, "LOCALIZED": 0}
+    assert levels == dict.fromkeys((state.value for state in State), 1) | {
+        "NO_MAP": 2,
+        "LOCALIZED": 0,
+    }
 
 
 def test_status_comes_at_its_rate_and_at_every_change(recorder):

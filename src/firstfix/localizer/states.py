@@ -88,7 +88,7 @@ def next_state(state: State, event: Event) -> State:
 
 
 def diagram() -> str:
-    """Return the table as a Mermaid state diagram; events between the same states share an arrow."""
+    """Return the table as a Mermaid state diagram, with one arrow for each pair of states."""
     events: dict[tuple[str, str], list[str]] = {}
     for (state, event), target in TABLE.items():
         events.setdefault((state.value, target.value), []).append(event.value)
