@@ -122,11 +122,6 @@ def test_a_name_is_not_empty():
         AmclConfig(odom_frame_id="")
 
 
-def test_an_enum_is_not_its_text():
-    with pytest.raises(InputError, match="laser_model_type"):
-        AmclConfig(laser_model_type="beam")
-
-
 def test_an_error_names_the_range_and_the_default():
     with pytest.raises(InputError) as error:
         AmclConfig(z_hit=1.5)

@@ -83,11 +83,11 @@ def test_both_ends_of_a_range_belong_to_it(good):
         ({"shift": 10**400}, "a number"),
         ({"is_on": 1}, "true or false"),
         ({"is_on": "true"}, "true or false"),
-        ({"colour": "red"}, "one of red, blue, received 'red'; the default is red"),
+        ({"colour": "green"}, "colour as one of red, blue, received 'green'"),
         ({"name": ""}, "name .on the label. as a text, received ''"),
         ({"name": 5}, "a text"),
         ({"note": None}, "a text"),
-        ({"place": (0.0, 0.0, 0.0)}, "a pose"),
+        ({"place": (0.0, 0.0)}, "metres and radians"),
     ],
 )
 def test_what_does_not_fit_is_told_with_the_remedy(bad, words):

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from firstfix.core.arguments import as_pose
 from firstfix.core.errors import MapError
 from firstfix.core.se2 import SE2
 
@@ -83,6 +84,7 @@ class OccupancyGrid:
         cells.flags.writeable = False
         object.__setattr__(self, "cells", cells)
         object.__setattr__(self, "resolution", float(self.resolution))
+        object.__setattr__(self, "T_map_grid", as_pose(self.T_map_grid, "T_map_grid"))
         if self.unseen is not None:
             if self.unseen.shape != cells.shape or self.unseen.dtype != np.bool_:
                 raise MapError(

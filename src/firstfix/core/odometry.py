@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
+from firstfix.core.arguments import as_member, as_pose
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 
@@ -32,6 +33,7 @@ class Odometry:
 
     def __post_init__(self) -> None:
         _check_stamp(self.stamp)
+        object.__setattr__(self, "T_odom_base", as_pose(self.T_odom_base, "T_odom_base"))
 
 
 class SignalKind(Enum):
@@ -73,6 +75,7 @@ class Signal:
 
     def __post_init__(self) -> None:
         _check_stamp(self.stamp)
+        object.__setattr__(self, "kind", as_member(SignalKind, self.kind, "kind"))
 
 
 def _check_stamp(stamp: float) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from firstfix.core.angles import FULL_TURN
+from firstfix.core.arguments import as_member, as_pose
 from firstfix.core.errors import ScanError
 from firstfix.core.se2 import SE2
 
@@ -101,6 +102,8 @@ class LaserScan:
             "use 0 where the time is not known",
         )
         object.__setattr__(self, "ranges", ranges)
+        object.__setattr__(self, "T_base_laser", as_pose(self.T_base_laser, "T_base_laser"))
+        object.__setattr__(self, "mounting", as_member(Mounting, self.mounting, "mounting"))
 
     def __len__(self) -> int:
         return len(self.ranges)

@@ -7,7 +7,9 @@ from dataclasses import field, fields
 from enum import Enum
 from typing import Any
 
+from firstfix.core.arguments import as_member, as_pose
 from firstfix.core.errors import InputError
+from firstfix.core.se2 import SE2
 
 # Beyond this a whole number has no float of its own, and no setting has a meaning.
 _WHOLE_LIMIT = 2.0**53
@@ -59,6 +61,10 @@ def _checked(name: str, value: object, default: object, metadata: dict[str, Any]
     least, most = metadata["least"], metadata["most"]
     if isinstance(default, float) and type(value) is int and abs(value) < _WHOLE_LIMIT:
         value = float(value)
+    if isinstance(default, Enum):
+        return as_member(type(default), value, name)
+    if isinstance(default, SE2):
+        return as_pose(value, name)
     fits = type(value) is type(default) and (value != "" or default == "")
     if fits and isinstance(value, (int, float)):
         # Not for NaN, not for infinity.
@@ -70,12 +76,10 @@ def _checked(name: str, value: object, default: object, metadata: dict[str, Any]
     raise InputError(
         expected=f"{name} ({metadata['description']}) as {_kind(default)}{limits}",
         received=f"{value!r:.60}",
-        remedy=f"the default is {default.value if isinstance(default, Enum) else default}",
+        remedy=f"the default is {default}",
     )
 
 
 def _kind(default: object) -> str:
-    if isinstance(default, Enum):
-        return "one of " + ", ".join(str(choice.value) for choice in type(default))
     names = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
-    return names.get(type(default), "a pose")
+    return names[type(default)]

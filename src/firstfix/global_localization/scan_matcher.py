@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from firstfix.core.arguments import as_instance, as_member, as_pose
 from firstfix.core.estimate import Hypothesis, LocateResult, SearchReport, Verdict
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
@@ -41,8 +42,8 @@ class ScanMatcher:
     ----------
     grid : OccupancyGrid
         The map.
-    method : Method
-        How to search.
+    method : Method or str
+        How to search: ``"fast"``, ``"paper"`` or ``"paper-basic"``.
     config : LocateConfig, optional
         Settings of the default method.
     cache_dir : Path, optional
@@ -51,6 +52,8 @@ class ScanMatcher:
 
     Raises
     ------
+    InputError
+        If an argument has the wrong type, or no method has this name.
     MapError
         If the map has no wall, or no free space to be in.
     """
@@ -59,15 +62,15 @@ class ScanMatcher:
         self,
         grid: OccupancyGrid,
         *,
-        method: Method = Method.FAST,
+        method: Method | str = Method.FAST,
         config: LocateConfig | None = None,
         cache_dir: Path | None = None,
     ) -> None:
-        check_searchable(grid)
-        self.method = method
-        self.config = config or LocateConfig()
+        check_searchable(as_instance(OccupancyGrid, grid, "grid"))
+        self.method = as_member(Method, method, "method")
+        self.config = as_instance(LocateConfig, config or LocateConfig(), "config")
         self.fields = build_fields(grid, cache_dir)
-        if method is Method.FAST:
+        if self.method is Method.FAST:
             check_positions(self.fields)
         else:
             _ = self.fields.pointscore  # part of the preparation, not of the first scan
@@ -85,6 +88,7 @@ class ScanMatcher:
         LocateResult
             Verdict and ranked hypotheses for ``T_map_base``.
         """
+        as_instance(LaserScan, scan, "scan")
         if self.method is Method.FAST:
             return locate(scan, self.fields, self.config)
         poses = exhaustive.FAST if self.method is Method.PAPER else exhaustive.BASIC
@@ -105,7 +109,8 @@ class ScanMatcher:
         tuple of Hypothesis
             One for each pose; the probability is that of the place against a wrong map.
         """
-        return score_poses(scan, poses, self.fields)
+        as_instance(LaserScan, scan, "scan")
+        return score_poses(scan, [as_pose(pose, "pose") for pose in poses], self.fields)
 
     def search_locally(self, scan: LaserScan, T_map_base: SE2) -> Hypothesis:
         """Find the best pose within about a metre and 40 degrees of a given one.
@@ -122,7 +127,8 @@ class ScanMatcher:
         Hypothesis
             The best; its probability is that of the place against a wrong map.
         """
-        return search_locally(scan, T_map_base, self.fields)
+        as_instance(LaserScan, scan, "scan")
+        return search_locally(scan, as_pose(T_map_base, "T_map_base"), self.fields)
 
 
 def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateResult:

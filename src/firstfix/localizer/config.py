@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from firstfix.amcl.config import AmclConfig
+from firstfix.core.arguments import as_instance
 from firstfix.core.errors import InputError
 from firstfix.global_localization.config import LocateConfig
 
@@ -96,3 +97,8 @@ class LocalizerConfig:
     locate: LocateConfig = field(default_factory=LocateConfig)
     amcl: AmclConfig = field(default_factory=AmclConfig)
     watch: WatchConfig = field(default_factory=WatchConfig)
+
+    def __post_init__(self) -> None:
+        as_instance(LocateConfig, self.locate, "locate")
+        as_instance(AmclConfig, self.amcl, "amcl")
+        as_instance(WatchConfig, self.watch, "watch")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from firstfix.core.arguments import as_instance, as_pose
+from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Odometry, Signal
 from firstfix.core.scan import LaserScan
@@ -25,6 +27,9 @@ class NewMap:
     stamp: float
     grid: OccupancyGrid
 
+    def __post_init__(self) -> None:
+        as_instance(OccupancyGrid, self.grid, "grid")
+
 
 @dataclass(frozen=True, slots=True)
 class PoseHint:
@@ -43,6 +48,9 @@ class PoseHint:
     stamp: float
     T_map_base: SE2
     source: str = "a person"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_map_base", as_pose(self.T_map_base, "T_map_base"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,3 +80,14 @@ class NoMotionUpdate:
 
 
 Input = NewMap | LaserScan | Odometry | Signal | PoseHint | Reset | NoMotionUpdate
+
+
+def check_input(given: object) -> None:
+    """Raise InputError if a value is no input of a localizer."""
+    if not isinstance(given, Input):
+        raise InputError(
+            expected="an input: NewMap, LaserScan, Odometry, Signal, PoseHint, Reset "
+            "or NoMotionUpdate",
+            received=type(given).__name__,
+            remedy="wrap it, such as ff.NewMap(stamp, grid) for a map",
+        )

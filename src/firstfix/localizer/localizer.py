@@ -14,6 +14,7 @@ from firstfix.amcl.initial import around_pose
 from firstfix.amcl.particles import Particles
 from firstfix.amcl.sensor import build_sensor
 from firstfix.amcl.tracker import Track, Tracker
+from firstfix.core.arguments import as_instance
 from firstfix.core.estimate import Evidence, Hypothesis, Verdict
 from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.scan import LaserScan
@@ -23,7 +24,14 @@ from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.contest import Contest, Standing
 from firstfix.localizer.deciding_motion import deciding_motion
-from firstfix.localizer.inputs import Input, NewMap, NoMotionUpdate, PoseHint, Reset
+from firstfix.localizer.inputs import (
+    Input,
+    NewMap,
+    NoMotionUpdate,
+    PoseHint,
+    Reset,
+    check_input,
+)
 from firstfix.localizer.odometry_buffer import OdometryBuffer
 from firstfix.localizer.outputs import Hypotheses, InitialPose, Output, Status, TrackedPose
 from firstfix.localizer.pose_monitor import Finding, Watch
@@ -65,7 +73,7 @@ class Localizer:
     def __init__(
         self, config: LocalizerConfig | None = None, cache_dir: Path | None = None
     ) -> None:
-        self.config = config or LocalizerConfig()
+        self.config = as_instance(LocalizerConfig, config or LocalizerConfig(), "config")
         self._state = State.NO_MAP
         self._cache_dir = cache_dir
         self._rng = np.random.default_rng(self.config.amcl.seed)
@@ -119,9 +127,12 @@ class Localizer:
 
         Raises
         ------
+        InputError
+            If this is no input.
         MapError
             If a new map cannot be searched. The state is that of before.
         """
+        check_input(given)
         if isinstance(given, NewMap):
             return self._take_map(given)
         if isinstance(given, Odometry):
