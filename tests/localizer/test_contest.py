@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import count
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ def begun(matcher, pose, lidar, rng):
     """Begin a contest with what one scan leaves open."""
     result = matcher.locate(lidar.scan(matcher.fields.grid, pose, rng))
     assert result.verdict is Verdict.AMBIGUOUS
-    return Contest(result.hypotheses, ODOM, matcher, CONFIG)
+    return Contest(result.hypotheses, ODOM, matcher, CONFIG, count(1))
 
 
 def turning(contest, world, pose, lidar, rng, looks):
@@ -120,7 +121,7 @@ def test_who_is_elsewhere_does_not_win_where_the_places_were(
     listed = hall_locator.locate(lidar.scan(hall_plan, pose, rng)).hypotheses
     wrong = tuple(place for place in listed if place.pose.distance_to(pose) > 1.0)
     assert len(wrong) >= 2
-    contest = Contest(wrong, ODOM, hall_locator, CONFIG)
+    contest = Contest(wrong, ODOM, hall_locator, CONFIG, count(1))
     for standing, at in turning(contest, hall_plan, pose, lidar, rng, 6):
         if standing is Standing.WON:
             assert contest.places[0].pose.distance_to(at) < 0.1
@@ -138,7 +139,7 @@ def test_in_a_foreign_building_nothing_wins(hall_plan, office_locator):
         result = office_locator.locate(lidar.scan(hall_plan, pose, rng))
         if result.verdict is not Verdict.AMBIGUOUS:
             continue
-        contest = Contest(result.hypotheses, ODOM, office_locator, CONFIG)
+        contest = Contest(result.hypotheses, ODOM, office_locator, CONFIG, count(1))
         for standing, _ in turning(contest, hall_plan, pose, lidar, rng, 12):
             assert standing is not Standing.WON
             if standing is Standing.LOST:

@@ -61,6 +61,9 @@ class Hypothesis:
         probability of a place that is not listed.
     evidence : Evidence
         How the beams agree with the map here.
+    id : int or None
+        Number that a localizer gives to the place and keeps as long as the place is listed; None
+        in the answer to a single scan.
     """
 
     pose: SE2
@@ -68,6 +71,7 @@ class Hypothesis:
     score: float
     probability: float
     evidence: Evidence
+    id: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

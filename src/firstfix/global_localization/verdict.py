@@ -24,6 +24,9 @@ _DOUBTFUL_FIT = 0.6
 # Mean cost at which the best place of a wrong map begins to be as good as the right one.
 _WRONG_MAP_COST = 2.3
 
+# A place at least this fraction as likely as the best one is its rival.
+RIVAL_SHARE = 0.1
+
 
 def place_probabilities(scores: NDArray[np.float64], beams: int) -> NDArray[np.float64]:
     """Turn the costs of separate places into probabilities.
@@ -98,7 +101,7 @@ def judge(
             "wrong map, unmapped place or blocked sensor"
         )
         return Verdict.NO_MATCH, reason
-    rivals = int(np.count_nonzero(probabilities >= 0.1 * probabilities[0]))
+    rivals = count_rivals(probabilities)
     doubt = "; perhaps the wrong map" if best.explained < _DOUBTFUL_FIT else ""
     if rivals > 1:
         reason = f"{rivals} places fit about as well; motion would tell them apart{doubt}"
@@ -107,6 +110,11 @@ def judge(
     else:
         reason = f"{fit} here, but others not badly enough to be sure{doubt}"
     return Verdict.AMBIGUOUS, reason
+
+
+def count_rivals(probabilities: NDArray[np.float64]) -> int:
+    """Count the places that fit about as well as the most likely one, which is included."""
+    return int(np.count_nonzero(probabilities >= RIVAL_SHARE * probabilities.max(initial=0.0)))
 
 
 def nothing_to_match(scan: LaserScan, hits: int, needed: int, elapsed_s: float) -> LocateResult:

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from firstfix.core.estimate import Hypothesis, LocateResult, Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.scan_matcher import ScanMatcher
-from firstfix.global_localization.verdict import log_likelihoods
+from firstfix.global_localization.verdict import RIVAL_SHARE, count_rivals, log_likelihoods
 from firstfix.localizer.config import WatchConfig
 from firstfix.localizer.relocation import moved_on, same_place
 
 # Two scans half a metre apart are half as good as two of different robots.
 _NEWS = 0.5
-# A place of the whole map that is less likely, against the best there, is no rival.
-_RIVAL_SHARE = 0.1
 _MOST_ENTRIES = 64
 _LEAST_UNLISTED = 1e-3
 
@@ -61,6 +61,8 @@ class Contest:
         The static stage.
     config : WatchConfig
         Settings.
+    ids : iterator of int
+        Gives every new place its number.
     """
 
     def __init__(
@@ -69,16 +71,19 @@ class Contest:
         T_odom_base: SE2,
         matcher: ScanMatcher,
         config: WatchConfig,
+        ids: Iterator[int],
     ) -> None:
         self._matcher = matcher
         self._config = config
+        self._ids = ids
         self._looked_at = T_odom_base
         self._looks = 0
         self._misses = 0
         # That the robot is where nobody has listed it, in another building perhaps.
         unlisted = 1.0 - sum(place.probability for place in places)
         self._log_unlisted = math.log(max(unlisted, _LEAST_UNLISTED))
-        self._entries = _entries(places, T_odom_base)
+        self._entries: list[Entry] = []
+        self._entries = self._numbered(places, T_odom_base)
 
     @property
     def places(self) -> tuple[Hypothesis, ...]:
@@ -88,6 +93,11 @@ class Contest:
         shares = (weights / weights.sum())[:-1].tolist()
         ranked = sorted(zip(shares, self._entries, strict=True), key=lambda pair: -pair[0])
         return tuple(replace(entry.place, probability=share) for share, entry in ranked)
+
+    @property
+    def rivals(self) -> int:
+        """Number of places that are about as likely as the best one, which is included."""
+        return count_rivals(_probabilities(self.places))
 
     def brings_news(self, T_odom_base: SE2) -> bool:
         """Tell whether the robot has moved enough for a scan to say something new."""
@@ -130,10 +140,11 @@ class Contest:
         return Standing.WON if decided and enough else Standing.OPEN
 
     def look_at_rest(self, scan: LaserScan, T_odom_base: SE2) -> Standing:
-        """Ask whether the scan at the same place has become a better one: people and hands go.
+        """Search with another scan from the same place: people and hands go.
 
-        It is no second witness, so nothing is weighed; but a UNIQUE scan decides, and as long as no
-        motion has decided anything, the places are those of the last scan. Arguments as in `look`.
+        It is no independent evidence, so nothing is weighed. A UNIQUE scan decides. Before the
+        first motion a scan with other rivals replaces the list; otherwise the list and its order
+        stay. Arguments as in `look`.
 
         Returns
         -------
@@ -145,8 +156,8 @@ class Contest:
         best = result.best
         if best is None or result.verdict is Verdict.NO_MATCH:
             return Standing.OPEN
-        if self._looks == 0:
-            self._entries = _entries(result.hypotheses, T_odom_base)
+        if self._looks == 0 and self._has_other_rivals(result):
+            self._entries = self._numbered(result.hypotheses, T_odom_base)
         if result.verdict is Verdict.UNIQUE and self._wins_outright(best):
             return Standing.WON
         return Standing.OPEN
@@ -162,7 +173,12 @@ class Contest:
         *logs, unlisted = _NEWS * log_likelihoods(scores, examined[0].evidence.beams)
         self._log_unlisted += float(unlisted)
         weighed = [
-            Entry(place.pose @ T_odom_base.inverse(), entry.log_weight + float(log), place)
+            replace(
+                entry,
+                T_map_odom=place.pose @ T_odom_base.inverse(),
+                log_weight=entry.log_weight + float(log),
+                place=replace(place, id=entry.place.id),
+            )
             for entry, place, log in zip(self._entries, examined, logs, strict=True)
         ]
         weighed.sort(key=lambda entry: -entry.log_weight)
@@ -175,7 +191,7 @@ class Contest:
         known = self._known(place)
         if known is None or place.score > self._config.won_cost:
             return False
-        self._entries = [replace(known, place=place)]
+        self._entries = [replace(known, place=replace(place, id=known.place.id))]
         return True
 
     def _admit(self, result: LocateResult, T_odom_base: SE2) -> None:
@@ -187,9 +203,10 @@ class Contest:
         for place in result.hypotheses:
             share = place.probability / best.probability
             full = len(self._entries) >= _MOST_ENTRIES
-            if share >= _RIVAL_SHARE and not full and self._known(place) is None:
+            if share >= RIVAL_SHARE and not full and self._known(place) is None:
+                numbered = replace(place, id=next(self._ids))
                 self._entries.append(
-                    Entry(place.pose @ T_odom_base.inverse(), most + math.log(share), place)
+                    Entry(place.pose @ T_odom_base.inverse(), most + math.log(share), numbered)
                 )
 
     def _known(self, place: Hypothesis) -> Entry | None:
@@ -199,9 +216,26 @@ class Contest:
                 return entry
         return None
 
+    def _numbered(self, places: tuple[Hypothesis, ...], T_odom_base: SE2) -> list[Entry]:
+        """Make entries of places; those that are known keep their numbers."""
+        entries = []
+        for place in places:
+            known = self._known(place)
+            number = next(self._ids) if known is None else known.place.id
+            log_weight = math.log(max(place.probability, 1e-9))
+            T_map_odom = place.pose @ T_odom_base.inverse()
+            entries.append(Entry(T_map_odom, log_weight, replace(place, id=number)))
+        return entries
 
-def _entries(places: tuple[Hypothesis, ...], T_odom_base: SE2) -> list[Entry]:
-    return [
-        Entry(place.pose @ T_odom_base.inverse(), math.log(max(place.probability, 1e-9)), place)
-        for place in places
-    ]
+    def _has_other_rivals(self, result: LocateResult) -> bool:
+        """Tell whether a rival has come up or vanished since the last search."""
+        found = result.hypotheses[: count_rivals(_probabilities(result.hypotheses))]
+        listed = self.places[: self.rivals]
+        return any(self._known(place) is None for place in found) or not all(
+            any(same_place(place.pose, other.pose, self._config) for other in result.hypotheses)
+            for place in listed
+        )
+
+
+def _probabilities(places: tuple[Hypothesis, ...]) -> NDArray[np.float64]:
+    return np.array([place.probability for place in places])

@@ -33,7 +33,7 @@ class NewMap:
 
 @dataclass(frozen=True, slots=True)
 class PoseHint:
-    """Somebody says where the robot is; good to about a metre and 40 degrees.
+    """A proposed pose, good to about a metre and 40 degrees; the next scan verifies it.
 
     Parameters
     ----------
@@ -42,12 +42,16 @@ class PoseHint:
     T_map_base : SE2
         The pose.
     source : str
-        Who says so, in the words that people will read.
+        Where it comes from, in the words that people will read.
+    hypothesis_id : int or None
+        The place of the last `Hypotheses` that is meant. Its pose at present replaces
+        `T_map_base`; if the place is no longer listed, the hint is refused.
     """
 
     stamp: float
     T_map_base: SE2
     source: str = "a person"
+    hypothesis_id: int | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_map_base", as_pose(self.T_map_base, "T_map_base"))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -93,7 +96,9 @@ class Localizer:
         self._matcher: ScanMatcher
         self._tracker: Tracker
         self._watch: Watch
-        self._contest: Contest
+        self._contest: Contest | None = None
+        self._chosen_by: str | None = None
+        self._ids = itertools.count(1)
 
     @property
     def state(self) -> State:
@@ -140,7 +145,7 @@ class Localizer:
         if isinstance(given, Signal):
             return self._take_signal(given)
         if self._state is State.NO_MAP:
-            return [Status(given.stamp, self._state, "no map yet")]
+            return [self._status(given.stamp, "no map yet")]
         if isinstance(given, LaserScan):
             self._waiting.append(given)
             return self._take_waiting_scan()
@@ -196,19 +201,25 @@ class Localizer:
         self._fire(Event.SET_DOWN)
         if self._hint is not None:
             self._fire(Event.HINT_RECEIVED)
-        return [Status(given.stamp, self._state, "set down: waiting for the next scan")]
+        return [self._status(given.stamp, "set down: waiting for the next scan")]
 
     def _take_hint(self, given: PoseHint) -> list[Output]:
-        self._track = None
+        if given.hypothesis_id is not None:
+            place = self._listed_place(given.hypothesis_id)
+            if place is None:
+                reason = f"place {given.hypothesis_id} is no longer listed: choose another one"
+                return [self._status(given.stamp, reason)]
+            given = replace(given, T_map_base=place.pose)
+        self._track = self._chosen_by = None
         self._hint = given
         self._fire(Event.HINT_RECEIVED)
         reason = f"{given.source} proposes a pose: the next scan will verify it"
-        return [Status(given.stamp, self._state, reason)]
+        return [self._status(given.stamp, reason)]
 
     def _take_update_request(self, given: NoMotionUpdate) -> list[Output]:
         self._update_asked = True
         self._found_nothing_at = None
-        return [Status(given.stamp, self._state, "the next scan will be used in any case")]
+        return [self._status(given.stamp, "the next scan will be used in any case")]
 
     def _take_waiting_scan(self) -> list[Output]:
         last = self._odometry.last
@@ -223,7 +234,7 @@ class Localizer:
         T_odom_base = self._odometry.at(scan.stamp)
         if T_odom_base is None:
             reason = "a scan is older than the odometry that is known: left out"
-            return [Status(scan.stamp, self._state, reason)]
+            return [self._status(scan.stamp, reason)]
         if self._lifted or scan.stamp < self._stands_since:
             return []
         if self._state is State.SEARCHING:
@@ -245,42 +256,45 @@ class Localizer:
         if best is None or result.verdict is Verdict.NO_MATCH:
             self._found_nothing_at = scan.stamp, T_odom_base
             evidence = best.evidence if best is not None else None
-            return [Status(scan.stamp, self._state, result.reason, evidence)]
+            return [self._status(scan.stamp, result.reason, evidence)]
         if result.verdict is Verdict.UNIQUE:
             if not self._believable(T_odom_base, best):
                 reason = "one place fits, far from where the track was lost: waiting for more"
-                return [Status(scan.stamp, self._state, reason, best.evidence)]
+                return [self._status(scan.stamp, reason, best.evidence)]
             return self._arrive(scan, T_odom_base, best, Event.ONE_PLACE_FITS, result.reason)
-        self._contest = Contest(result.hypotheses, T_odom_base, self._matcher, self.config.watch)
+        self._contest = self._contest_of(result.hypotheses, T_odom_base)
         self._looked_at = scan.stamp
         self._fire(Event.SEVERAL_PLACES_FIT)
-        return self._tell_places(scan, result.reason)
+        return self._publish_places(scan, self._contest, result.reason)
 
     def _decide(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
-        if self._contest.brings_news(T_odom_base) or self._update_asked:
-            standing = self._contest.look(scan, T_odom_base)
+        contest = self._contest
+        assert contest is not None  # noqa: S101 - every way into this state begins one
+        if contest.brings_news(T_odom_base) or self._update_asked:
+            standing = contest.look(scan, T_odom_base)
         elif not 0.0 <= scan.stamp - self._looked_at < self.config.watch.look_again_s:
-            standing = self._contest.look_at_rest(scan, T_odom_base)
+            standing = contest.look_at_rest(scan, T_odom_base)
         else:
             return []
         self._update_asked, self._looked_at = False, scan.stamp
-        best = self._contest.places[0]
+        best = contest.places[0]
         if standing is Standing.WON:
-            reason = f"one place has won; {best.evidence.explained:.0%} of the beams fit there"
+            reason = f"one place is left; {best.evidence.explained:.0%} of the beams fit there"
             return self._arrive(scan, T_odom_base, best, Event.DECIDED, reason)
         if standing is Standing.LOST:
             reason = "no remaining place explains the scans: searching"
             return [self._forget(scan.stamp, Event.CONTRADICTED, reason)]
-        left = len(self._contest.places)
-        reason = f"{left} places left, the best at {best.probability:.0%}; motion would decide"
-        return self._tell_places(scan, reason)
+        reason = f"the best place has a probability of {best.probability:.0%}"
+        if contest.rivals > 1:
+            reason = f"{contest.rivals} places fit about as well; motion would decide"
+        return self._publish_places(scan, contest, reason)
 
     def _verify_hint(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
         hint = self._hint
         assert hint is not None  # noqa: S101 - every way into this state brings one
         if np.count_nonzero(usable_beams(scan).hit) < FEWEST_HITS:
             reason = f"{hint.source} proposes a pose; the sensor sees too little to verify it"
-            return [Status(scan.stamp, self._state, reason)]
+            return [self._status(scan.stamp, reason)]
         self._hint = None
         place = self._matcher.search_locally(scan, hint.T_map_base)
         result = self._matcher.locate(scan)
@@ -289,9 +303,18 @@ class Localizer:
         elsewhere = result.verdict is Verdict.UNIQUE and not known
         as_good = place.score <= _AS_GOOD * max(best.score, _GOOD_COST)
         if as_good and not elsewhere and place.score <= self.config.watch.doubtful_cost:
+            contest = None
+            if result.verdict is not Verdict.UNIQUE:
+                contest = self._contest or self._contest_of(
+                    (*result.hypotheses, place), T_odom_base
+                )
             fit = f"{place.evidence.explained:.0%} of the beams fit there"
             reason = f"{hint.source} proposed this pose; {fit}"
-            return self._arrive(scan, T_odom_base, place, Event.HINT_CONFIRMED, reason)
+            outputs = self._arrive(scan, T_odom_base, place, Event.HINT_CONFIRMED, reason)
+            if contest is None:
+                return outputs
+            self._contest, self._chosen_by = contest, hint.source
+            return [*outputs[:-1], self._status(scan.stamp, self._choice(), place.evidence)]
         reason = f"the pose proposed by {hint.source} does not explain the scan: searching"
         return [self._forget(scan.stamp, Event.HINT_REJECTED, reason, place.evidence)]
 
@@ -312,15 +335,21 @@ class Localizer:
         self._has_leapt &= look.finding is not Finding.FITS
         if self._has_leapt:
             reason = f"odometry has leapt, and only {said} since: waiting for more"
-            return [Status(scan.stamp, self._state, reason, evidence)]
+            return [self._status(scan.stamp, reason, evidence)]
         reason = {
             Finding.FITS: said,
             Finding.SILENT: "the sensor sees too little to tell: going on by odometry",
         }.get(look.finding, f"doubtful: only {said}")
+        if self._contest is not None and look.finding is Finding.FITS:
+            other = self._reconsider(scan, T_odom_base, T_map_base, self._contest)
+            if other is not None:
+                reason = f"the scans fit another place than the one chosen by {self._chosen_by}"
+                return self._arrive(scan, T_odom_base, other, Event.RELOCALIZED, reason)
+            reason = self._choice() if self._chosen_by is not None else reason
         covariance = track.state.estimate.covariance
         return [
             TrackedPose(scan.stamp, T_map_base, covariance, track.T_map_odom),
-            Status(scan.stamp, self._state, reason, evidence),
+            self._status(scan.stamp, reason, evidence),
         ]
 
     # ---- steps
@@ -330,17 +359,18 @@ class Localizer:
     ) -> list[Output]:
         """Tell that the robot is found, and follow from there."""
         tracked = self._settle(scan, T_odom_base, place)
+        self._contest = self._chosen_by = None
         self._fire(event)
         return [
             InitialPose(scan.stamp, place.pose, tracked.covariance),
             tracked,
-            Status(scan.stamp, self._state, reason, place.evidence),
+            self._status(scan.stamp, reason, place.evidence),
         ]
 
     def _correct(self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis) -> list[Output]:
         """Put a track right that is a little off; the robot was neither lost nor found."""
         tracked = self._settle(scan, T_odom_base, place)
-        return [tracked, Status(scan.stamp, self._state, "put right", place.evidence)]
+        return [tracked, self._status(scan.stamp, "put right", place.evidence)]
 
     def _settle(self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis) -> TrackedPose:
         """Begin a track at a place."""
@@ -391,23 +421,59 @@ class Localizer:
         self._last_word_at = None
         self._found_nothing_at = None
         self._candidates.clear()
-        self._track = None
-        self._hint = None
+        self._track = self._hint = self._contest = self._chosen_by = None
         self._waiting.clear()
         self._fire(event)
-        return Status(stamp, self._state, reason, evidence)
+        return self._status(stamp, reason, evidence)
 
     def _fire(self, event: Event) -> None:
         self._state = next_state(self._state, event)
 
-    def _tell_places(self, scan: LaserScan, reason: str) -> list[Output]:
-        places = self._contest.places
+    def _status(self, stamp: float, reason: str, evidence: Evidence | None = None) -> Status:
+        rivals = 1 if self._state is State.LOCALIZED else 0
+        if self._contest is not None:
+            rivals = self._contest.rivals
+        return Status(stamp, self._state, reason, evidence, rivals, self._chosen_by)
+
+    def _contest_of(self, places: Sequence[Hypothesis], T_odom_base: SE2) -> Contest:
+        return Contest(tuple(places), T_odom_base, self._matcher, self.config.watch, self._ids)
+
+    def _publish_places(self, scan: LaserScan, contest: Contest, reason: str) -> list[Output]:
+        places = contest.places
         motion = deciding_motion(scan, places, self._matcher.fields.grid)
         outputs: list[Output] = [
             Hypotheses(scan.stamp, places),
-            Status(scan.stamp, self._state, reason, places[0].evidence),
+            self._status(scan.stamp, reason, places[0].evidence),
         ]
         return [*outputs, motion] if motion is not None else outputs
+
+    def _listed_place(self, hypothesis_id: int) -> Hypothesis | None:
+        places = self._contest.places if self._contest is not None else ()
+        return next((place for place in places if place.id == hypothesis_id), None)
+
+    def _reconsider(
+        self, scan: LaserScan, T_odom_base: SE2, T_map_base: SE2, contest: Contest
+    ) -> Hypothesis | None:
+        """Weigh a pose that a person chose against its rivals; return another place that won."""
+        if not contest.brings_news(T_odom_base):
+            return None
+        standing = contest.look(scan, T_odom_base)
+        if standing is Standing.LOST:
+            result = self._matcher.locate(scan)
+            self._contest = self._contest_of(result.hypotheses, T_odom_base)
+        if standing is not Standing.WON:
+            return None
+        best = contest.places[0]
+        if not same_place(best.pose, T_map_base, self.config.watch):
+            return best
+        self._contest = self._chosen_by = None
+        return None
+
+    def _choice(self) -> str:
+        """Say who chose the pose, and what the scans say."""
+        rivals = self._contest.rivals if self._contest is not None else 1
+        fit = f"{rivals} places fit equally well" if rivals > 1 else "the scans do not decide yet"
+        return f"chosen by {self._chosen_by}; {fit}"
 
     def _follow_jump(self, before: Odometry | None, now: Odometry) -> list[Output]:
         """Go on at the same pose in a new odometry frame; the next scan will tell whether."""
@@ -415,6 +481,7 @@ class Localizer:
             # The places moved with the old frame.
             reason = "odometry jumped while several places fit: searching"
             return [self._forget(now.stamp, Event.ODOMETRY_JUMPED, reason)]
+        self._contest = None
         if self._track is None or before is None:
             return []
         T_map_base = self._track.T_map_odom @ before.T_odom_base

@@ -55,14 +55,15 @@ class TrackedPose:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Hypotheses:
-    """Where the robot may be, as far as one scan tells.
+    """The places where the robot may be.
 
     Parameters
     ----------
     stamp : float
         Time of the scan, s.
     places : tuple of Hypothesis
-        Most likely first.
+        Most likely first. Each has an `id`, which stays the same as long as the place is listed.
+        While the robot rests and no other place comes up, the order stays the same, too.
     """
 
     stamp: float
@@ -105,12 +106,19 @@ class Status:
         In words, for a person.
     evidence : Evidence or None
         How the scan agrees with the map at the pose in question.
+    rivals : int
+        Number of places that fit about equally well, the best or published one included: 1 where
+        the evidence has decided, 0 where no place is known.
+    chosen_by : str or None
+        Source of the hint that chose the published pose, until the evidence decides.
     """
 
     stamp: float
     state: State
     reason: str
     evidence: Evidence | None = None
+    rivals: int = 0
+    chosen_by: str | None = None
 
 
 Output = InitialPose | TrackedPose | Hypotheses | MotionRequest | Status
