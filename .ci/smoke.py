@@ -19,14 +19,12 @@ WHERE = (2.0, 2.0, 0.5)
 MAKE = f"""
 import numpy as np
 import firstfix as ff
-from firstfix.io.logs.npz_writer import save_npz
-from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import identical_rooms
 
 grid = identical_rooms(1)
 ff.save_map(grid, "map.yaml")
-scan = Lidar().scan(grid, ff.SE2{WHERE}, np.random.default_rng(0))
-save_npz(ff.Recording((scan,)), "scan.npz")
+scan = ff.Lidar().scan(grid, ff.SE2{WHERE}, np.random.default_rng(0))
+ff.save_recording(ff.Recording((scan,)), "scan.npz")
 """
 IMPORT = """
 import sys, time

@@ -32,7 +32,7 @@ from firstfix.core.scan import Mounting
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.io.logs.load import load_recording
-from firstfix.io.logs.tum import load_tum
+from firstfix.io.logs.tum import load_trajectory
 from firstfix.io.maps.check import check_map
 from firstfix.io.maps.map_server import load_map, save_map
 from firstfix.io.parameters.amcl_yaml import load_amcl_config
@@ -127,7 +127,7 @@ def read_saved_pose(data: bytes, folder: Path) -> None:
 def read_tum(data: bytes, folder: Path) -> None:
     """Read a trajectory."""
     (folder / "track.tum").write_bytes(data)
-    load_tum(folder / "track.tum")
+    load_trajectory(folder / "track.tum")
 
 
 def read_node_parameters(data: bytes, folder: Path) -> None:

@@ -6,10 +6,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from firstfix.amcl.config import AmclConfig, MotionModel, SensorModel
     from firstfix.core.errors import FirstfixError, InputError, MapError, ScanError
     from firstfix.core.estimate import Evidence, Hypothesis, LocateResult, SearchReport, Verdict
     from firstfix.core.grid import OccupancyGrid
-    from firstfix.core.odometry import Odometry
+    from firstfix.core.odometry import Odometry, Signal, SignalKind
     from firstfix.core.recording import Recording
     from firstfix.core.scan import LaserScan, Mounting
     from firstfix.core.se2 import SE2
@@ -17,69 +18,123 @@ if TYPE_CHECKING:
     from firstfix.global_localization.config import LocateConfig, Method
     from firstfix.global_localization.scan_matcher import ScanMatcher
     from firstfix.io.logs.load import load_recording
+    from firstfix.io.logs.npz_writer import save_recording
+    from firstfix.io.logs.tum import load_trajectory, save_trajectory
     from firstfix.io.maps.map_server import load_map, save_map
-    from firstfix.localizer.config import LocalizerConfig
-    from firstfix.localizer.inputs import NewMap
+    from firstfix.lab.scenarios.example_drive import simulate_drive
+    from firstfix.lab.simulation.lidar import Lidar
+    from firstfix.localizer.config import LocalizerConfig, WatchConfig
+    from firstfix.localizer.inputs import NewMap, NoMotionUpdate, PoseHint, Reset
     from firstfix.localizer.localizer import Localizer
+    from firstfix.localizer.outputs import (
+        Hypotheses,
+        InitialPose,
+        MotionRequest,
+        Status,
+        TrackedPose,
+    )
+    from firstfix.localizer.precompile import warm_up
+    from firstfix.localizer.states import Event, State
 
 __version__ = "0.1.0"
 
-__all__ = [  # noqa: RUF022 - plainly sorted, as a reader looks for a name
+__all__ = [  # noqa: RUF022 - in plain alphabetical order
+    "AmclConfig",
+    "Event",
     "Evidence",
     "FirstfixError",
+    "Hypotheses",
     "Hypothesis",
+    "InitialPose",
     "InputError",
     "LaserScan",
+    "Lidar",
     "Localizer",
     "LocalizerConfig",
     "LocateConfig",
     "LocateResult",
     "MapError",
     "Method",
+    "MotionModel",
+    "MotionRequest",
     "Mounting",
     "NewMap",
+    "NoMotionUpdate",
     "OccupancyGrid",
     "Odometry",
+    "PoseHint",
     "Recording",
+    "Reset",
     "SE2",
     "ScanError",
     "ScanMatcher",
     "SearchReport",
+    "SensorModel",
+    "Signal",
+    "SignalKind",
+    "State",
+    "Status",
+    "TrackedPose",
     "Trajectory",
     "Verdict",
+    "WatchConfig",
     "load_map",
     "load_recording",
+    "load_trajectory",
     "save_map",
+    "save_recording",
+    "save_trajectory",
+    "simulate_drive",
+    "warm_up",
 ]
 
-# Each name is imported when it is first asked for: numba alone takes longer than 0.3 s.
-_ROOMS = {
+# A name is imported at its first use: numba alone takes longer than 0.3 s to import.
+_MODULES = {
+    "amcl.config": ("AmclConfig", "MotionModel", "SensorModel"),
     "core.errors": ("FirstfixError", "InputError", "MapError", "ScanError"),
     "core.estimate": ("Evidence", "Hypothesis", "LocateResult", "SearchReport", "Verdict"),
     "core.grid": ("OccupancyGrid",),
-    "core.odometry": ("Odometry",),
+    "core.odometry": ("Odometry", "Signal", "SignalKind"),
     "core.recording": ("Recording",),
     "core.scan": ("LaserScan", "Mounting"),
     "core.se2": ("SE2",),
     "core.trajectory": ("Trajectory",),
-    "io.maps.map_server": ("load_map", "save_map"),
-    "io.logs.load": ("load_recording",),
     "global_localization.config": ("LocateConfig", "Method"),
     "global_localization.scan_matcher": ("ScanMatcher",),
-    "localizer.config": ("LocalizerConfig",),
-    "localizer.inputs": ("NewMap",),
+    "io.logs.load": ("load_recording",),
+    "io.logs.npz_writer": ("save_recording",),
+    "io.logs.tum": ("load_trajectory", "save_trajectory"),
+    "io.maps.map_server": ("load_map", "save_map"),
+    "lab.scenarios.example_drive": ("simulate_drive",),
+    "lab.simulation.lidar": ("Lidar",),
+    "localizer.config": ("LocalizerConfig", "WatchConfig"),
+    "localizer.inputs": ("NewMap", "NoMotionUpdate", "PoseHint", "Reset"),
     "localizer.localizer": ("Localizer",),
+    "localizer.outputs": ("Hypotheses", "InitialPose", "MotionRequest", "Status", "TrackedPose"),
+    "localizer.precompile": ("warm_up",),
+    "localizer.states": ("Event", "State"),
 }
-_HOMES = {name: room for room, names in _ROOMS.items() for name in names}
+_HOMES = {name: module for module, names in _MODULES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name from where it lives."""
+    """Import a public name from its module."""
+    if name == "Locator":
+        return _renamed("Locator", "ScanMatcher")
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
+
+
+def _renamed(old: str, new: str) -> Any:
+    """Return a public name under its former one, with a warning."""
+    import warnings
+
+    message = f"firstfix.{old} was renamed: use firstfix.{new}"
+    warnings.warn(message, DeprecationWarning, stacklevel=3)
+    return __getattr__(new)
 
 
 def __dir__() -> list[str]:

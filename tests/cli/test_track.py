@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from firstfix.io.logs.tum import load_tum
+from firstfix.io.logs.tum import load_trajectory
 from firstfix.io.saved_pose import load_pose
 
 KEYS = [
@@ -113,7 +113,7 @@ def test_the_trajectory_has_a_pose_for_every_scan(
     cli, files: tuple[Path, Path], tmp_path: Path
 ) -> None:
     document = strict_json(cli("track", *files, "--out", "new/drive.tum", "--json").out)
-    trajectory = load_tum(tmp_path / "new" / "drive.tum")
+    trajectory = load_trajectory(tmp_path / "new" / "drive.tum")
     np.testing.assert_allclose(trajectory.stamps, 100.0 + 0.1 * np.arange(66))
     np.testing.assert_allclose(trajectory.poses[-1], document["end"]["pose"], atol=1e-9)
 
@@ -299,7 +299,7 @@ def test_a_search_needs_no_start(cli, files: tuple[Path, Path]) -> None:
     assert document["start"]["origin"] == "search"
     assert document["kept"] == 1.0
     assert "found after 0.0 s" in ended.err
-    assert len(load_tum(Path("found.tum"))) == document["scans"]
+    assert len(load_trajectory(Path("found.tum"))) == document["scans"]
 
 
 @pytest.mark.slow

@@ -1,77 +1,18 @@
-"""A log becomes inputs: everything once, in the order of time, whenever it is played."""
+"""Replaying a log: one input at a time, and every replay gives the same outputs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from firstfix.core.odometry import Odometry
 from firstfix.core.recording import Recording
-from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.core.trajectory import Trajectory
 from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import InitialPose, TrackedPose
-from firstfix.localizer.replay import recorded_inputs, replay
+from firstfix.localizer.replay import replay
 from firstfix.localizer.states import State
-
-times = st.lists(st.integers(0, 20).map(float), min_size=1, max_size=20).map(sorted)
-
-
-def scan_at(stamp: float) -> LaserScan:
-    return LaserScan(np.ones(3, np.float32), 0.0, 0.1, 0.1, 5.0, stamp=stamp)
-
-
-def log_of(scans: list[float], odometry: list[float] | None) -> Recording:
-    path = None
-    if odometry is not None:
-        poses = np.array([[0.01 * i, -0.02 * i, 0.03 * i] for i in range(len(odometry))])
-        path = Trajectory(np.array(odometry), poses)
-    return Recording(tuple(scan_at(stamp) for stamp in scans), path)
-
-
-@given(times, times)
-def test_inputs_come_in_the_order_of_their_stamps(scans, odometry):
-    recording = log_of(scans, odometry)
-    inputs = list(recorded_inputs(recording))
-    stamps = [given.stamp for given in inputs]
-    assert stamps == sorted(scans + odometry)
-    # Each kind is complete and in its own order: of equal stamps none overtakes another.
-    assert [given for given in inputs if isinstance(given, LaserScan)] == list(recording.scans)
-    assert [given for given in inputs if isinstance(given, Odometry)] == [
-        Odometry(stamp, SE2.from_array(pose))
-        for stamp, pose in zip(odometry, recording.odometry.poses, strict=True)
-    ]
-
-
-@given(times, times)
-def test_at_one_time_odometry_comes_first(scans, odometry):
-    """So that no scan has to wait for what is already known."""
-    seen: set[float] = set()
-    for given_ in recorded_inputs(log_of(scans, odometry)):
-        if isinstance(given_, LaserScan):
-            seen.add(given_.stamp)
-        else:
-            assert given_.stamp not in seen
-
-
-def test_without_odometry_there_are_scans():
-    recording = log_of([1.0, 2.0, 2.0], None)
-    assert list(recorded_inputs(recording)) == list(recording.scans)
-
-
-def test_a_log_is_read_as_it_is_played(driven):
-    """A long one is not turned into a list first."""
-    inputs = recorded_inputs(driven)
-    assert iter(inputs) is inputs
-    first, second = next(inputs), next(inputs)
-    assert isinstance(first, Odometry)
-    assert second is driven.scans[0]
 
 
 def test_replay_hands_on_one_input_at_a_time(hall_plan):
@@ -97,7 +38,7 @@ def played(driven, hall_plan, tmp_path_factory) -> list[list[tuple]]:
     for _ in range(2):
         localizer = Localizer(cache_dir=cache)
         localizer.handle(NewMap(0.0, hall_plan))
-        runs.append(list(replay(recorded_inputs(driven), localizer)))
+        runs.append(list(replay(driven.messages(), localizer)))
     return runs
 
 
@@ -129,5 +70,5 @@ def test_a_log_without_odometry_is_never_localized(driven, hall_plan, tmp_path):
     localizer = Localizer(cache_dir=tmp_path)
     localizer.handle(NewMap(0.0, hall_plan))
     recording = Recording(driven.scans[:5])
-    assert [out for _, out in replay(recorded_inputs(recording), localizer)] == [[]] * 5
+    assert [out for _, out in replay(recording.messages(), localizer)] == [[]] * 5
     assert localizer.state is State.SEARCHING

@@ -129,9 +129,9 @@ def track(
     if keeper is not None:
         keeper.save(_saved(tracked[-1], key))
     if out is not None:
-        from firstfix.io.logs.tum import save_tum
+        from firstfix.io.logs.tum import save_trajectory
 
-        save_tum(out, trajectory_of(tracked))
+        save_trajectory(trajectory_of(tracked), out)
     if plot is not None:
         from firstfix.lab.reports.track_picture import draw_track
 

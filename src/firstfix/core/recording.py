@@ -1,14 +1,19 @@
-"""A log of a drive: scans, and what was known beside them."""
+"""A log of a drive: scans, odometry and, where known, ground truth."""
 
 from __future__ import annotations
 
+import heapq
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from firstfix.core.arguments import as_instance
 from firstfix.core.errors import ScanError
+from firstfix.core.odometry import Odometry
 from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
 from firstfix.core.trajectory import Trajectory
 
 
@@ -42,7 +47,9 @@ class Recording:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        n = len(self.scans)
+        scans = tuple(as_instance(LaserScan, scan, "scans") for scan in self.scans)
+        object.__setattr__(self, "scans", scans)
+        n = len(scans)
         if n == 0:
             raise ScanError(
                 expected="at least one scan",
@@ -62,3 +69,24 @@ class Recording:
 
     def __len__(self) -> int:
         return len(self.scans)
+
+    def messages(self) -> Iterator[Odometry | LaserScan]:
+        """Return odometry and scans in the order of their stamps, as a robot sends them.
+
+        Yields
+        ------
+        Odometry or LaserScan
+            Inputs of a `Localizer`. At equal stamps the odometry comes first. Without odometry
+            there are scans only.
+        """
+        scans: Iterator[Odometry | LaserScan] = iter(self.scans)
+        yield from heapq.merge(self._odometry_messages(), scans, key=_stamp)
+
+    def _odometry_messages(self) -> Iterator[Odometry | LaserScan]:
+        if self.odometry is not None:
+            for stamp, pose in zip(self.odometry.stamps.tolist(), self.odometry.poses, strict=True):
+                yield Odometry(stamp, SE2.from_array(pose))
+
+
+def _stamp(message: Odometry | LaserScan) -> float:
+    return message.stamp

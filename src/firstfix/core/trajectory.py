@@ -47,10 +47,11 @@ class Trajectory:
                 received="NaN or infinity among them",
                 remedy="drop the poses that are not known",
             )
-        if (np.diff(stamps) < 0).any():
+        steps_back = stamps[1:] < stamps[:-1]
+        if steps_back.any():
             raise InputError(
                 expected="stamps in ascending order",
-                received=f"a step back at pose {int(np.argmax(np.diff(stamps) < 0)) + 1}",
+                received=f"a step back at pose {int(np.argmax(steps_back)) + 1}",
                 remedy="sort the log by time",
             )
         stamps.flags.writeable = poses.flags.writeable = False

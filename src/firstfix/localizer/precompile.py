@@ -18,15 +18,15 @@ _STEP_S = 0.1
 _SCANS = 30
 
 
-def warm_up(config: AmclConfig) -> None:
+def warm_up(config: AmclConfig | None = None) -> None:
     """Load or compile all kernels that a localizer may need, by a story in a small room.
 
     Parameters
     ----------
-    config : AmclConfig
+    config : AmclConfig, optional
         Its sensor and motion model choose among the kernels.
     """
-    localizer = Localizer(LocalizerConfig(amcl=config))
+    localizer = Localizer(LocalizerConfig(amcl=config or AmclConfig()))
     grid = small_room()
     localizer.handle(NewMap(0.0, grid))
     for i in range(_SCANS):

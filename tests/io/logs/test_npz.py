@@ -21,7 +21,7 @@ from firstfix.core.recording import Recording
 from firstfix.core.scan import LaserScan, Mounting
 from firstfix.core.se2 import SE2
 from firstfix.core.trajectory import Trajectory
-from firstfix.io.logs.npz import load_npz, read_scan, save_npz
+from firstfix.io.logs.npz import load_npz, read_scan, save_recording
 
 Write = Callable[..., Path]
 
@@ -251,7 +251,7 @@ def _recording(mounting: Mounting = Mounting.UPRIGHT) -> Recording:
 @pytest.mark.parametrize("mounting", Mounting)
 def test_a_recording_comes_back_as_it_went(tmp_path: Path, mounting: Mounting) -> None:
     before = _recording(mounting)
-    save_npz(before, tmp_path / "a.npz")
+    save_recording(before, tmp_path / "a.npz")
     after = load_npz(tmp_path / "a.npz")
     for a, b in zip(before.scans, after.scans, strict=True):
         assert_array_equal(a.ranges, b.ranges)
@@ -272,7 +272,7 @@ def test_a_recording_comes_back_as_it_went(tmp_path: Path, mounting: Mounting) -
 def test_saving_replaces_the_file_whole_and_leaves_nothing_else(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     path.write_text("old")
-    save_npz(Recording(_recording().scans), path)
+    save_recording(Recording(_recording().scans), path)
     assert [p.name for p in tmp_path.iterdir()] == ["a.npz"]
     assert load_npz(path).truth is None
 
@@ -280,7 +280,7 @@ def test_saving_replaces_the_file_whole_and_leaves_nothing_else(tmp_path: Path) 
 def test_scans_of_two_sensors_do_not_fit_one_file(tmp_path: Path) -> None:
     other = LaserScan(np.ones(3), 0.0, 0.1, 0.0, 9.0)
     with pytest.raises(ScanError, match="scans of one sensor"):
-        save_npz(Recording((*_recording().scans, other)), tmp_path / "a.npz")
+        save_recording(Recording((*_recording().scans, other)), tmp_path / "a.npz")
     assert not list(tmp_path.iterdir())
 
 

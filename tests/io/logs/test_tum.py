@@ -13,7 +13,7 @@ from firstfix.core.angles import angle_error
 from firstfix.core.errors import InputError
 from firstfix.core.trajectory import Trajectory
 from firstfix.io.logs import tum
-from firstfix.io.logs.tum import load_tum, save_tum
+from firstfix.io.logs.tum import load_trajectory, save_trajectory
 
 PATH = Trajectory(
     np.array([1.0, 1700000000.1234567]), np.array([[1.5, -2.0, 0.0], [0.1, 1e-30, math.pi / 2]])
@@ -25,13 +25,13 @@ FINITE = st.floats(allow_nan=False, allow_infinity=False)
 def load(tmp_path):
     def load(text: str | bytes) -> Trajectory:
         (tmp_path / "t.tum").write_bytes(text.encode() if isinstance(text, str) else text)
-        return load_tum(tmp_path / "t.tum")
+        return load_trajectory(tmp_path / "t.tum")
 
     return load
 
 
 def test_the_lines_are_the_formats(tmp_path):
-    save_tum(tmp_path / "t.tum", PATH)
+    save_trajectory(PATH, tmp_path / "t.tum")
     comment, first, second = (tmp_path / "t.tum").read_text().splitlines()
     assert comment == "# timestamp tx ty tz qx qy qz qw"
     assert first == "1.000000000 1.5 -2.0 0.0 0.0 0.0 0.0 1.0"
@@ -49,8 +49,8 @@ def test_the_lines_are_the_formats(tmp_path):
 )
 def test_what_is_saved_is_loaded(tmp_path, stamps, poses):
     saved = Trajectory(np.array(stamps), np.array(poses[: len(stamps)]))
-    save_tum(tmp_path / "t.tum", saved)
-    loaded = load_tum(tmp_path / "t.tum")
+    save_trajectory(saved, tmp_path / "t.tum")
+    loaded = load_trajectory(tmp_path / "t.tum")
     assert_array_equal(loaded.stamps, saved.stamps)
     assert_array_equal(loaded.poses[:, :2], saved.poses[:, :2])
     assert angle_error(loaded.poses[:, 2], saved.poses[:, 2]).max() < 1e-14
@@ -112,7 +112,7 @@ def test_a_file_without_poses(load, text):
 
 def test_a_trajectory_without_poses_is_not_saved(tmp_path):
     with pytest.raises(InputError, match="at least one pose"):
-        save_tum(tmp_path / "t.tum", Trajectory(np.empty(0), np.empty((0, 3))))
+        save_trajectory(Trajectory(np.empty(0), np.empty((0, 3))), tmp_path / "t.tum")
     assert not (tmp_path / "t.tum").exists()
 
 
@@ -131,25 +131,25 @@ def test_an_endless_line_is_not_read_to_its_end(load):
 @pytest.mark.parametrize("name", ["missing.tum", "."])
 def test_what_is_no_file(tmp_path, name):
     with pytest.raises(InputError, match="expected a TUM trajectory, received no file"):
-        load_tum(tmp_path / name)
+        load_trajectory(tmp_path / name)
 
 
 def test_an_error_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
-    save_tum(tmp_path / "t.tum", PATH)
+    save_trajectory(PATH, tmp_path / "t.tum")
 
     def refuse(*_args):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("os.fsync", refuse)
     with pytest.raises(InputError, match="No space left"):
-        save_tum(tmp_path / "t.tum", Trajectory(np.zeros(1), np.zeros((1, 3))))
-    assert_array_equal(load_tum(tmp_path / "t.tum").stamps, PATH.stamps)
+        save_trajectory(Trajectory(np.zeros(1), np.zeros((1, 3))), tmp_path / "t.tum")
+    assert_array_equal(load_trajectory(tmp_path / "t.tum").stamps, PATH.stamps)
     assert [path.name for path in tmp_path.iterdir()] == ["t.tum"]
 
 
 def test_a_folder_that_does_not_exist(tmp_path: Path):
     with pytest.raises(InputError, match="No such file"):
-        save_tum(tmp_path / "no folder" / "t.tum", PATH)
+        save_trajectory(PATH, tmp_path / "no folder" / "t.tum")
 
 
 WORDS = st.sampled_from(["0", "1", "-1", "0.5", "nan", "1e308", "#", "x", "\n", "\0", "1e-320"])

@@ -14,12 +14,12 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.core.trajectory import Trajectory
 from firstfix.io.logs.npz_archive import NpzArchive
-from firstfix.io.logs.npz_writer import save_npz
+from firstfix.io.logs.npz_writer import save_recording
 from firstfix.io.logs.scan_errors import check_max_scans, located, too_many_scans
 from firstfix.io.logs.stamps import ascending, sorting_notes
 from firstfix.io.ros_messages.poses import chain
 
-__all__ = ["MAX_JITTER", "load_npz", "read_scan", "save_npz"]
+__all__ = ["MAX_JITTER", "load_npz", "read_scan", "save_recording"]
 
 # Loggers write messages in the order of their arrival. A longer step back, s, means that a clock
 # was set or logs were joined, and sorting would shuffle two drives.

@@ -15,7 +15,7 @@ from firstfix.core.se2 import SE2
 from firstfix.io.ros_messages.poses import chain
 
 
-def save_npz(recording: Recording, path: str | Path) -> None:
+def save_recording(recording: Recording, path: str | Path) -> None:
     """Write a recording to an .npz file, all or nothing.
 
     Odometry is kept at the stamps of the scans only (NaN where it does not reach); notes are not

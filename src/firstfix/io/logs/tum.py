@@ -31,16 +31,16 @@ _NORM_ERROR = 0.1
 _HEADER = b"# timestamp tx ty tz qx qy qz qw\n"
 
 
-def save_tum(path: str | os.PathLike[str], trajectory: Trajectory) -> None:
+def save_trajectory(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
     """Write a trajectory, all or nothing.
 
     Parameters
     ----------
-    path : path-like
-        Where to; an existing file is replaced.
     trajectory : Trajectory
         Poses over time. Every stamp and coordinate comes back to the last bit, yaw within rounding
         and in (-π, π].
+    path : path-like
+        Where to; an existing file is replaced.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def save_tum(path: str | os.PathLike[str], trajectory: Trajectory) -> None:
     replace_file(Path(path), _lines(trajectory))
 
 
-def load_tum(path: str | os.PathLike[str]) -> Trajectory:
+def load_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     """Read a trajectory; height, and a tilt up to `MAX_TILT`, are left out.
 
     Parameters

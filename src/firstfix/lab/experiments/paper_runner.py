@@ -26,7 +26,7 @@ from firstfix.localizer.inputs import NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Output, TrackedPose
 from firstfix.localizer.precompile_room import small_room
-from firstfix.localizer.replay import recorded_inputs, replay
+from firstfix.localizer.replay import replay
 
 PAPER_WORLDS: dict[str, Callable[[], OccupancyGrid]] = {
     "laboratory": laboratory,
@@ -98,7 +98,7 @@ def follow_with_system(recording: Recording, grid: OccupancyGrid) -> Attempt:
     first = last = NO_CLOUD
     outputs: list[Output] = []
     began = time.process_time()
-    for given, answers in replay(recorded_inputs(recording), localizer):
+    for given, answers in replay(recording.messages(), localizer):
         outputs += answers
         if not isinstance(given, LaserScan):
             continue

@@ -17,7 +17,7 @@ from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.inputs import NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import InitialPose, Output, Status, TrackedPose
-from firstfix.localizer.replay import recorded_inputs, replay
+from firstfix.localizer.replay import replay
 
 
 class NeverFoundError(FirstfixError):
@@ -58,7 +58,7 @@ def search_and_follow(
     tracked: list[TrackedScan] = []
     reason, cpu_s = "no scan has odometry at its stamp", 0.0
     began = time.process_time()
-    for given, outputs in replay(recorded_inputs(recording), localizer):
+    for given, outputs in replay(recording.messages(), localizer):
         cpu_s += time.process_time() - began
         reason = next((o.reason for o in reversed(outputs) if isinstance(o, Status)), reason)
         for output in outputs:
