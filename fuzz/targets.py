@@ -17,6 +17,7 @@ from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from rosbags.interfaces import Nodetype
@@ -33,6 +34,7 @@ from firstfix.core.se2 import SE2
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.io.logs.load import load_recording
 from firstfix.io.logs.tum import load_trajectory
+from firstfix.io.maps import image
 from firstfix.io.maps.check import check_map
 from firstfix.io.maps.map_server import load_map, save_map
 from firstfix.io.parameters.amcl_yaml import load_amcl_config
@@ -70,7 +72,7 @@ def read_map_yaml(data: bytes, folder: Path) -> None:
     """Read a YAML beside a good image."""
     (folder / "map.pgm").write_bytes(b"P5 3 2 255\n" + bytes([0, 205, 254, 0, 205, 254]))
     (folder / "map.yaml").write_bytes(data)
-    load_map(folder / "map.yaml", MAX_CELLS)
+    load_map(folder / "map.yaml")
     check_map(folder / "map.yaml")
 
 
@@ -78,7 +80,8 @@ def _image_of(kind: str) -> Target:
     def read(data: bytes, folder: Path) -> None:
         (folder / "map.yaml").write_bytes(_HEADER % kind.encode() + _THRESHOLDS)
         (folder / f"map.{kind}").write_bytes(data)
-        load_map(folder / "map.yaml", MAX_CELLS)
+        with patch.object(image, "MAX_CELLS", MAX_CELLS):
+            load_map(folder / "map.yaml")
 
     return read
 
@@ -307,12 +310,12 @@ def _images(kind: str, folder: Path) -> Iterator[bytes]:
 
     grid = OccupancyGrid(np.array([[0, 100, -1], [0, 0, 100]], np.int8), 0.05)
     save_map(grid, folder / "seed.yaml")
-    image = Image.open(next(p for p in folder.glob("seed.*") if p.suffix != ".yaml"))
-    for mode in ("L",) if kind == "pgm" else ("L", "RGB", "P", "RGBA"):
+    picture = Image.open(next(p for p in folder.glob("seed.*") if p.suffix != ".yaml"))
+    for mode in ("L", "RGB") if kind == "pgm" else ("L", "RGB", "P", "RGBA"):
         if kind == "bmp" and mode == "RGBA":
             continue
         buffer = io.BytesIO()
-        image.convert(mode).save(buffer, "PPM" if kind == "pgm" else kind.upper())
+        picture.convert(mode).save(buffer, "PPM" if kind == "pgm" else kind.upper())
         yield buffer.getvalue()
     if kind == "pgm":
         yield b"P2 3 2 15\n0 1 2 3 4 15\n"

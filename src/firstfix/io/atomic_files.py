@@ -1,20 +1,20 @@
-"""Files that are read whole, or written whole or not at all."""
+"""Files that are read as a whole, and written completely or not at all."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import re
+import reprlib
 import time
 import uuid
 from collections.abc import Iterable
 from pathlib import Path
 
 from firstfix.core.errors import InputError
-from firstfix.io.maps.files import is_file, show
 
 _DRAFT = re.compile(r"\.[0-9a-f]{32}\.draft")
-# Nobody writes for so long, s: what is older was left by somebody who was killed while writing.
+# Writing never takes so long, s: an older draft is left from a process that was killed.
 _ABANDONED_AFTER_S = 3600.0
 
 
@@ -55,13 +55,28 @@ def read_bytes(path: Path, *, what: str, limit: int) -> bytes:
     return data
 
 
+def is_file(path: Path) -> bool:
+    """Return whether this is a regular file; reading a pipe or a device may never end."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # names that no file system can hold
+        return False
+
+
+def show(value: object) -> str:
+    """Return a short printable form of any content of a file."""
+    shortener = reprlib.Repr()
+    shortener.maxstring = shortener.maxother = 100
+    return shortener.repr(value)
+
+
 def check_is_file(path: Path, what: str) -> None:
-    """Refuse what is no regular file; a pipe or a device may never end.
+    """Check that this is a regular file.
 
     Raises
     ------
     InputError
-        If there is no such file, or it is of another kind.
+        If there is no such file, or it is a folder, pipe or device.
     """
     if not is_file(path):
         raise InputError(
@@ -72,25 +87,25 @@ def check_is_file(path: Path, what: str) -> None:
 
 
 def replace_file(path: Path, pieces: Iterable[bytes]) -> None:
-    """Write a file, so that whoever reads it meanwhile sees the old one or the new one, whole.
+    """Write a file atomically: readers see the complete old one or the complete new one.
 
-    A power cut leaves one of the two as well. Several may write at once; the last one counts.
+    This holds after a power cut, too. Of several writers at once, the last one counts.
 
     Parameters
     ----------
     path : Path
-        Where to. An existing file is replaced, through a link if it is one; its folder must exist.
+        An existing file is replaced; a symbolic link is followed. The folder must exist.
     pieces : iterable of bytes
         The content, in order.
 
     Raises
     ------
     InputError
-        If it cannot be written; then the old file, if any, is as it was.
+        If it cannot be written; an old file is then unchanged.
     """
     try:
         target = path.resolve()
-        if target.exists() and not target.is_file():  # a device must not become a file
+        if target.exists() and not target.is_file():  # do not replace a device
             raise InputError(
                 expected="the path of a file to write",
                 received=f"{path}, which is a folder or a device",
@@ -108,16 +123,16 @@ def replace_file(path: Path, pieces: Iterable[bytes]) -> None:
 
 
 def write_whole(target: Path, pieces: Iterable[bytes | memoryview]) -> None:
-    """Write a draft and give it the name of the file; raises OSError, and then nothing changed.
+    """Write a draft and rename it; raises OSError, and then nothing changed.
 
     Parameters
     ----------
     target : Path
-        The file itself, no link to it.
+        The file, not a link to it.
     pieces : iterable of bytes
         The content, in order.
     """
-    # Renaming is atomic only within one folder, and the name must not be anybody else's.
+    # Renaming is atomic only within one folder, and no other process may use the name.
     draft = target.with_name(f".{uuid.uuid4().hex}.draft")
     try:
         with draft.open("xb") as file:
@@ -128,7 +143,7 @@ def write_whole(target: Path, pieces: Iterable[bytes | memoryview]) -> None:
     finally:
         draft.unlink(missing_ok=True)
     _remove_abandoned(target.parent)
-    with contextlib.suppress(OSError):  # not every file system can; the content is safe already
+    with contextlib.suppress(OSError):  # not on every file system; the content is already safe
         folder = os.open(target.parent, os.O_RDONLY)
         try:
             os.fsync(folder)
@@ -137,7 +152,7 @@ def write_whole(target: Path, pieces: Iterable[bytes | memoryview]) -> None:
 
 
 def _remove_abandoned(folder: Path) -> None:
-    """Remove drafts that nobody will finish; a robot that is switched off often leaves many."""
+    """Remove drafts of killed processes; a robot that is often switched off leaves many."""
     with contextlib.suppress(OSError):
         for path in folder.iterdir():
             is_draft = _DRAFT.fullmatch(path.name) is not None
@@ -146,13 +161,7 @@ def _remove_abandoned(folder: Path) -> None:
 
 
 def remove_file(path: Path) -> None:
-    """Remove a file, if there is one.
-
-    Raises
-    ------
-    InputError
-        If it stays there.
-    """
+    """Remove a file if it exists; raises InputError if that is impossible."""
     try:
         path.unlink(missing_ok=True)
     except OSError as error:

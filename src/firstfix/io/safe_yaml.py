@@ -1,31 +1,33 @@
-"""YAML from strangers: parsed to nodes under narrow limits, never turned into objects."""
+"""YAML files from other people: `yaml.SafeLoader` with limits."""
 
 from __future__ import annotations
 
-import math
 import re
+from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from firstfix.core.errors import InputError
-from firstfix.io.maps.files import show
+from firstfix.io.atomic_files import show
 
 # Parameters of a costmap's sensor under a namespace are eight levels deep; parsing is recursive.
 _MAX_DEPTH = 16
 
-_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
-_TRUE, _FALSE = ("true", "yes", "on", "y"), ("false", "no", "off", "n")
+
+class Repeated:
+    """Value of a key that a mapping gives more than once; parsers differ in which one counts."""
 
 
-class _FlatLoader(yaml.SafeLoader):
-    """Refuses what no robot needs and an attacker does: aliases and deep nesting."""
+class _Loader(yaml.SafeLoader):
+    """Rejects anchors, aliases and deep nesting, which can fill the memory or the stack."""
 
     depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         event = self.peek_event()  # type: ignore[no-untyped-call]
-        if getattr(event, "anchor", None) is not None:  # an alias has one, too
+        if getattr(event, "anchor", None) is not None:  # aliases have one, too
             raise yaml.YAMLError("anchors or aliases")
         if self.depth >= _MAX_DEPTH:
             raise yaml.YAMLError("deep nesting")
@@ -34,100 +36,93 @@ class _FlatLoader(yaml.SafeLoader):
         self.depth -= 1
         return node
 
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:  # noqa: FBT001, FBT002 - PyYAML's signature
+        mapping = super().construct_mapping(node, deep=deep)
+        if len(mapping) < len(node.value):
+            keys = Counter(self.construct_object(key, deep=True) for key, _ in node.value)
+            mapping |= {key: Repeated() for key, count in keys.items() if count > 1}
+        return mapping
 
-def parse_yaml(data: bytes, path: Path, *, example: str) -> yaml.MappingNode:
-    """Parse a YAML mapping; nothing is constructed, whatever its tag.
 
-    The time grows with the size, up to a second for 32 kB: bound the size before.
+# YAML 1.2 and ROS read 1e-3 and -.5 as numbers; PyYAML follows YAML 1.1, where they are text.
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"[-+]?([0-9]+\.[0-9]*|\.[0-9]+|[0-9]+(?=[eE]))([eE][-+]?[0-9]+)?$"),
+    list("-+.0123456789"),
+)
+
+
+def load_yaml(data: bytes | str, path: Path, *, example: str) -> Any:
+    """Load one YAML document; it takes up to a second for 32 kB, so limit the size first.
 
     Parameters
     ----------
-    data : bytes
-        What the file holds.
+    data : bytes or str
+        Content of the file.
     path : Path
-        The file, to be named in errors.
+        The file, for error messages.
     example : str
-        A line that such a file would have.
+        A line that such a file may have, for error messages.
 
     Returns
     -------
-    yaml.MappingNode
-        Scalars keep their text.
+    None, bool, int, float, str, date, list or dict
+        The document.
 
     Raises
     ------
     InputError
-        If it is no YAML mapping, has more than one document, uses aliases or nests deeply.
+        If it is not YAML, has more than one document, uses aliases or custom tags, or is nested
+        deeply.
     """
     try:
-        root = yaml.compose(data, Loader=_FlatLoader)
-    except (yaml.YAMLError, ValueError, OverflowError) as error:  # the last two: odd escapes
+        return yaml.load(data, _Loader)  # noqa: S506 - a SafeLoader
+    except (yaml.YAMLError, ValueError, OverflowError, AttributeError) as error:
+        # The last three: odd escapes, dates and numbers.
         raise InputError(
             expected=f"plain YAML in {path}",
             received=_reason(error),
             remedy=f"write lines like '{example}'",
         ) from error
-    if not isinstance(root, yaml.MappingNode):
+
+
+def load_mapping(data: bytes, path: Path, *, example: str) -> dict[Any, Any]:
+    """Load a YAML document like `load_yaml`, which must be a mapping."""
+    document = load_yaml(data, path, example=example)
+    if not isinstance(document, dict):
         raise InputError(
             expected=f"lines 'key: value' in {path}",
-            received=kind(root),
-            remedy=f"begin with a line like '{example}'",
+            received="an empty file" if document is None else kind(document),
+            remedy=f"start with a line like '{example}'",
         )
-    return root
+    return document
 
 
-def entries(mapping: yaml.MappingNode, path: Path) -> dict[str, yaml.Node]:
-    """List the entries of a mapping.
-
-    Parameters
-    ----------
-    mapping : yaml.MappingNode
-        From `parse_yaml`, or a value in one.
-    path : Path
-        The file, to be named in errors.
-
-    Returns
-    -------
-    dict of str to yaml.Node
-        In the order of the file.
+def entries(mapping: dict[Any, Any], path: Path) -> dict[str, Any]:
+    """Return a mapping with its keys as text.
 
     Raises
     ------
     InputError
-        If a key is given twice.
+        If a key occurs more than once.
     """
-    found: dict[str, yaml.Node] = {}
-    for key, value in mapping.value:
-        name = str(key.value) if isinstance(key, yaml.ScalarNode) else kind(key)
-        if name in found and isinstance(key, yaml.ScalarNode):  # readers differ in which counts
+    for key, value in mapping.items():
+        if isinstance(value, Repeated):
             raise InputError(
                 expected=f"every key once in {path}",
-                received=f"{show(name)} twice",
+                received=f"{show(str(key))} twice",
                 remedy="delete one of the two lines",
             )
-        found[name] = value
-    return found
+    return {str(key): value for key, value in mapping.items()}
 
 
-def kind(node: yaml.Node | None) -> str:
-    """Say in words what stands at a place of a YAML."""
-    if isinstance(node, yaml.SequenceNode):
+def kind(value: Any) -> str:
+    """Describe a value for people."""
+    if isinstance(value, list):
         return "a list"
-    if isinstance(node, yaml.MappingNode):
+    if isinstance(value, dict):
         return "a mapping"
-    return "an empty file" if node is None else show(node.value)
-
-
-def to_number(text: str) -> float:
-    """Read a number as ROS does; NaN where the text is none, infinite where it is too large."""
-    # PyYAML takes 1e-3 for a word and Python 1_0 for a number; ROS does neither.
-    return float(text) if _NUMBER.fullmatch(text) else math.nan
-
-
-def to_flag(text: str) -> bool | None:
-    """Read a word for yes or no as ROS does; None where the text is neither."""
-    word = text.lower()
-    return word in _TRUE if word in _TRUE + _FALSE else None
+    return "nothing" if value is None else show(value)
 
 
 def _reason(error: Exception) -> str:

@@ -16,8 +16,7 @@ from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.fields.cache import content_key
-from firstfix.io.atomic_files import read_bytes, replace_file
-from firstfix.io.maps.files import show
+from firstfix.io.atomic_files import read_bytes, replace_file, show
 
 MAX_POSITION_M = 1e9
 """No robot is farther from its origin; transforms of such numbers stay finite."""

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from enum import Enum
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.io.parameters.amcl_yaml import load_amcl_config
 from firstfix.io.parameters.ros_parameters import read_parameters
-from firstfix.io.safe_yaml import kind, parse_yaml, to_flag, to_number
+from firstfix.io.safe_yaml import kind, load_mapping
 from firstfix.ros.names import Names
 from firstfix.ros.node_config import NodeConfig
 from firstfix.ros.parameters import configured, parameters
 
 _NODE, _NAMESPACE = ("__node", "__name"), "__ns"
-_STRING = "tag:yaml.org,2002:str"
 
 
 def names_from(rules: Iterable[str], node: str, namespace: str) -> Names:
@@ -97,8 +93,8 @@ def settings_from(
         values |= {name: _scalar(name, value) for name, value in found.items()}
     for assignment in assignments:
         name, text = _split(assignment, "mode:=full")
-        line = parse_yaml(f"value: {text}".encode(), Path(name), example=assignment)
-        values[name] = _scalar(name, line.value[0][1])
+        line = load_mapping(f"value: {text}".encode(), Path(name), example=assignment)
+        values[name] = _scalar(name, line["value"])
     return configured(values | {k: v for k, v in options.items() if v is not None})
 
 
@@ -125,18 +121,9 @@ def _amcl_values(path: Path) -> dict[str, Any]:
     return values
 
 
-def _scalar(name: str, node: yaml.Node) -> bool | int | float | str:
-    """Read a value by ROS's rules: quotes make a text, and so does what is nothing else."""
-    if not isinstance(node, yaml.ScalarNode):
-        raise InputError(
-            expected=f"one value for {name}", received=kind(node), remedy="write a number or a word"
-        )
-    text = str(node.value)
-    if node.style is not None:
-        return text
-    flag, number = to_flag(text), to_number(text)
-    if flag is not None:
-        return flag
-    if math.isnan(number):
-        return text
-    return int(text) if text.lstrip("+-").isdigit() else number
+def _scalar(name: str, value: Any) -> bool | int | float | str:
+    if isinstance(value, (bool, int, float, str)):
+        return value
+    raise InputError(
+        expected=f"one value for {name}", received=kind(value), remedy="write a number or a word"
+    )

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from firstfix.core.errors import InputError
 from firstfix.core.odometry import Odometry
-from firstfix.io.maps.files import is_file
+from firstfix.io.atomic_files import is_file
 from firstfix.io.recalled_pose import recall
 from firstfix.io.saved_pose import SavedPose, load_pose, map_key
 from firstfix.localizer.inputs import Input, NewMap, PoseHint

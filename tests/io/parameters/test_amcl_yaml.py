@@ -1,4 +1,4 @@
-"""A file of Nav2 becomes the same settings, and whatever is not understood is told."""
+"""A file of Nav2 becomes the same settings; everything else is rejected with a remedy."""
 
 from dataclasses import fields
 from enum import Enum
@@ -75,11 +75,11 @@ def test_a_dump_of_the_node_is_read(load):
     )
 
 
-def test_nothing_said_is_the_default(load):
+def test_missing_parameters_have_their_defaults(load):
     assert load("amcl: {ros__parameters: {use_sim_time: true}}") == AmclConfig()
 
 
-def test_other_nodes_are_none_of_our_business(load):
+def test_sections_of_other_nodes_are_ignored(load):
     other = "controller_server: {ros__parameters: {alpha1: many, FollowPath: {plugin: x}}}\n"
     assert load(other + "amcl: {ros__parameters: {alpha1: 0.3}}").alpha1 == 0.3
 
@@ -115,8 +115,10 @@ def written(value: object) -> object:
 
 
 def test_every_setting_can_be_written_and_read(load):
-    said = {e.name: written(e.default) for e in fields(AmclConfig) if e.name != "initial_pose"}
-    assert load(yaml.safe_dump({"amcl": {"ros__parameters": said}})) == AmclConfig()
+    given_values = {
+        e.name: written(e.default) for e in fields(AmclConfig) if e.name != "initial_pose"
+    }
+    assert load(yaml.safe_dump({"amcl": {"ros__parameters": given_values}})) == AmclConfig()
 
 
 @given(
@@ -133,13 +135,15 @@ def test_every_setting_can_be_written_and_read(load):
     )
 )
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_what_is_written_is_read(load, said):
-    text = "".join(f"    {k}: {written(v)!r}\n" for k, v in said.items())
-    assert load(f"amcl:\n  ros__parameters:\n    use_sim_time: true\n{text}") == AmclConfig(**said)
+def test_written_settings_are_read_unchanged(load, given_values):
+    text = "".join(f"    {k}: {written(v)!r}\n" for k, v in given_values.items())
+    assert load(f"amcl:\n  ros__parameters:\n    use_sim_time: true\n{text}") == AmclConfig(
+        **given_values
+    )
 
 
 @pytest.mark.parametrize("name", sorted(IGNORED))
-def test_what_has_no_effect_may_be_anything(load, name):
+def test_ignored_parameters_may_have_any_value(load, name):
     assert load(f"alpha1: 0.2\n{name}: [1, {{a: b}}]\n") == AmclConfig()
 
 
@@ -161,20 +165,20 @@ def test_what_has_no_effect_may_be_anything(load, name):
         ("alpha1: .nan", "alpha1 as a finite number"),
         ("alpha1: 1e999", "alpha1 as a finite number"),
         ("alpha1: true", "alpha1 as a finite number"),
-        ("alpha1: '0.2'", "'0.2' in quotes"),
+        ("alpha1: '0.2'", "received '0.2'; write it like 'alpha1: 0.2', without quotes"),
         ("alpha1:", "received nothing"),
         ("alpha1: [0.2]", "received a list"),
-        ("alpha1: !!python/object/apply:os.getcwd []", "received a list"),
-        ("alpha1: !number 0.2", "with the tag '!number'"),
+        ("alpha1: !!python/object/apply:os.getcwd []", "plain YAML"),
+        ("alpha1: !number 0.2", "plain YAML .*'!number'"),
         ("alpha1: $(var alpha)", "alpha1 as a finite number"),
         ("alpha1: -1", "alpha1 .* of at least 0"),
         ("z_hit: 2", "z_hit .* at most 1"),
         ("max_beams: 60.5", "max_beams as a whole number"),
-        ("max_beams: " + "9" * 5000, "max_beams as a whole number"),
+        ("max_beams: " + "9" * 4000, "max_beams as a whole number"),
         ("max_beams: 1", "max_beams .* of at least 2"),
         ("min_particles: 3000", "min_particles up to max_particles"),
         ("do_beamskip: 1", "do_beamskip as true or false"),
-        ("do_beamskip: 'true'", "in quotes; write it like 'do_beamskip: false'"),
+        ("do_beamskip: 'true'", "write it like 'do_beamskip: false', without quotes"),
         ("base_frame_id: 5", "base_frame_id as text"),
         ("base_frame_id: on", "base_frame_id as text"),
         ("base_frame_id: ''", "base_frame_id as text"),
@@ -189,7 +193,7 @@ def test_what_has_no_effect_may_be_anything(load, name):
         ),
     ],
 )
-def test_what_is_refused_and_what_to_do(load, line, says):
+def test_invalid_lines_are_rejected_with_a_remedy(load, line, says):
     with pytest.raises(InputError, match=says) as caught:
         load(f"amcl:\n  ros__parameters:\n    use_sim_time: true\n    {line}\n")
     assert "nav2_params.yaml" in str(caught.value)
@@ -220,10 +224,10 @@ NAMES = st.sampled_from([entry.name for entry in fields(AmclConfig)]) | st.text(
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(st.dictionaries(NAMES, VALUES, max_size=3))
-def test_any_values_become_settings_or_one_sentence(load, said):
-    refusal = ""
+def test_any_values_give_settings_or_one_sentence(load, given_values):
+    message = ""
     try:
-        load(yaml.safe_dump({"amcl": {"ros__parameters": said}}))
+        load(yaml.safe_dump({"amcl": {"ros__parameters": given_values}}))
     except InputError as error:
-        refusal = str(error)
-    assert "\n" not in refusal
+        message = str(error)
+    assert "\n" not in message

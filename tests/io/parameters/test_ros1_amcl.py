@@ -1,4 +1,4 @@
-"""Whoever brings a file of ROS 1 along is told today's names."""
+"""Names of ROS 1 are rejected with their new names."""
 
 from dataclasses import fields
 
@@ -33,7 +33,7 @@ def test_the_motion_model_is_translated_with_its_value(text, model):
     assert f"'robot_model_type: {model.value}'" in (ros1_remedy("odom_model_type", text) or "")
 
 
-def test_what_is_gone_and_what_never_was():
+def test_removed_and_unknown_names():
     assert "delete" in (ros1_remedy("gui_publish_rate", "10") or "")
     assert ros1_remedy("alpha1", "0.2") is None
     assert ros1_remedy("anything", "") is None

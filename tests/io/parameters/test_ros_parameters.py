@@ -1,4 +1,4 @@
-"""The section of one node is found in every form of a parameter file, or its absence is told."""
+"""The section of one node is found in every form of a parameter file."""
 
 import pytest
 import yaml
@@ -17,7 +17,7 @@ def read(tmp_path):
         path = tmp_path / "params.yaml"
         path.write_bytes(text.encode() if isinstance(text, str) else text)
         found = read_parameters(path, "node", KNOWN)
-        return {name: value.value for name, value in found.items()}
+        return dict(found)
 
     return read
 
@@ -40,8 +40,8 @@ def read(tmp_path):
         "/**: {ros__parameters: {of_another: 1}, node: {ros__parameters: {gain: 1}}}",
     ],
 )
-def test_where_a_section_may_stand(read, text):
-    assert read(text) == {"gain": "1"}
+def test_every_form_of_a_section_is_read(read, text):
+    assert read(text) == {"gain": 1}
 
 
 def test_names_are_dotted(read):
@@ -51,14 +51,14 @@ def test_names_are_dotted(read):
 
 @pytest.mark.parametrize("text", ["pose: {x: 1}", "pose.x: 1", "unheard_of: 1\npose: {x: 1}"])
 def test_parameters_without_a_section(read, text):
-    assert read(text)["pose.x"] == "1"
+    assert read(text)["pose.x"] == 1
 
 
-def test_of_a_wildcard_and_the_nodes_own_section_the_later_counts(read):
+def test_the_later_of_a_wildcard_and_the_own_section_counts(read):
     wildcard = "/**: {ros__parameters: {gain: 1, rate: 1, of_another: 1}}\n"
     own = "node: {ros__parameters: {gain: 2, unheard_of: 2}}\n"
-    assert read(wildcard + own) == {"gain": "2", "rate": "1", "unheard_of": "2"}
-    assert read(own + wildcard) == {"gain": "1", "rate": "1", "unheard_of": "2"}
+    assert read(wildcard + own) == {"gain": 2, "rate": 1, "unheard_of": 2}
+    assert read(own + wildcard) == {"gain": 1, "rate": 1, "unheard_of": 2}
 
 
 def test_a_section_may_be_empty(read):
@@ -87,7 +87,7 @@ def test_a_section_may_be_empty(read):
         (b"a: 1 \n" * (MAX_PARAMETER_BYTES // 6 + 1), "at most 131072 bytes"),
     ],
 )
-def test_what_is_refused_and_why(read, text, says):
+def test_invalid_files_are_rejected_with_the_reason(read, text, says):
     with pytest.raises(InputError, match=says) as caught:
         read(text)
     assert "params.yaml" in str(caught.value)
@@ -101,7 +101,7 @@ TREES = st.recursive(
 )
 
 
-def refusal(read, text: str | bytes) -> str:
+def error_of(read, text: str | bytes) -> str:
     try:
         read(text)
     except InputError as error:
@@ -114,8 +114,8 @@ def refusal(read, text: str | bytes) -> str:
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(st.dictionaries(KEYS, TREES, max_size=4))
-def test_any_tree_is_read_or_refused_in_our_words(read, tree):
-    assert "\n" not in refusal(read, yaml.safe_dump(tree))
+def test_any_tree_is_read_or_rejected_in_one_line(read, tree):
+    assert "\n" not in error_of(read, yaml.safe_dump(tree))
 
 
 @settings(
@@ -123,5 +123,5 @@ def test_any_tree_is_read_or_refused_in_our_words(read, tree):
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(st.binary(max_size=60))
-def test_any_bytes_are_read_or_refused_in_our_words(read, data):
-    assert "\n" not in refusal(read, data)
+def test_any_bytes_are_read_or_rejected_in_one_line(read, data):
+    assert "\n" not in error_of(read, data)

@@ -16,8 +16,7 @@ import numpy as np
 
 from firstfix.core.errors import InputError
 from firstfix.core.trajectory import Trajectory
-from firstfix.io.atomic_files import check_is_file, replace_file, unreachable
-from firstfix.io.maps.files import show
+from firstfix.io.atomic_files import check_is_file, replace_file, show, unreachable
 
 # Fourteen hours at 100 Hz, 160 MB in memory.
 MAX_POSES = 5_000_000

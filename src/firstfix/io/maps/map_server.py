@@ -1,7 +1,7 @@
 """Maps as map_server reads and writes them: a small YAML beside an image.
 
-The meaning of a pixel follows Nav2 since Jazzy. Where its predecessors differ, `check_map` of
-`map_check` tells whether that matters for a given map:
+The meaning of a pixel follows Nav2 since Jazzy. Where older versions differ, `check_map` reports
+whether that matters for a given map:
 
 - A pixel exactly on a threshold is wall (``p >= occupied_thresh``) or free
   (``p <= free_thresh``); ROS 1 Noetic and Nav2 Humble compare strictly and say unknown.
@@ -21,26 +21,22 @@ from numpy.typing import NDArray
 
 from firstfix.core.errors import MapError
 from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from firstfix.io.atomic_files import write_whole
-from firstfix.io.maps.files import show, unreadable
-from firstfix.io.maps.image import open_image
-from firstfix.io.maps.pixels import DEFAULT_MAX_CELLS, MapImage, Strip
-from firstfix.io.maps.yaml_file import MapMode, MapYaml, check_resolution, read_yaml
+from firstfix.io.atomic_files import show, write_whole
+from firstfix.io.maps.image import read_image, unreadable
+from firstfix.io.maps.map_yaml import MapMode, MapYaml, check_resolution, read_yaml
 
 # What every map_saver writes; p of 205 is 0.19608, just above the threshold.
 GREY_OCCUPIED, GREY_UNKNOWN, GREY_FREE = 0, 205, 254
 SAVED_OCCUPIED_THRESH, SAVED_FREE_THRESH = 0.65, 0.196
 
 
-def load_map(path: str | os.PathLike[str], max_cells: int = DEFAULT_MAX_CELLS) -> OccupancyGrid:
+def load_map(path: str | os.PathLike[str]) -> OccupancyGrid:
     """Load a map of map_server.
 
     Parameters
     ----------
     path : path-like
-        The YAML, or a folder with one in it.
-    max_cells : int
-        Refuse larger images before they are decoded.
+        The YAML, or a folder that contains it.
 
     Returns
     -------
@@ -51,38 +47,42 @@ def load_map(path: str | os.PathLike[str], max_cells: int = DEFAULT_MAX_CELLS) -
     Raises
     ------
     MapError
-        If the YAML or the image is missing, broken, too large or not what a server could use.
+        If the YAML or the image is missing, damaged, too large or not usable for a map server.
     """
     header = read_yaml(path)
-    image = open_image(header.image, max_cells)
-    table = cell_table(header, image)
-    cells = np.empty((image.height, image.width), np.int8)
-    meant_unknown = (table == FREE) & (image.levels * 255 == GREY_UNKNOWN * image.white)
-    unseen = np.zeros(cells.shape, np.bool_) if meant_unknown.any() else None
-    for strip in image.strips():
-        rows = slice(image.height - strip.bottom, image.height - strip.top)
-        cells[rows] = to_cells(strip, table, header.mode)[::-1]
+    image = read_image(header.image)
+    table = cell_table(header, image.white)
+    is_grey_unknown = (table == FREE) & (
+        np.arange(image.white + 1) * 255 == GREY_UNKNOWN * image.white
+    )
+    cells = np.empty(image.levels.shape, np.int8)
+    unseen = np.zeros(cells.shape, np.bool_) if is_grey_unknown.any() else None
+    # Row by row: looking up a whole image would make indices of 8 bytes for every pixel.
+    for row, levels in enumerate(image.levels[::-1]):
+        cells[row] = table[levels]
         if unseen is not None:
-            unseen[rows] = meant_unknown[strip.codes][::-1]
+            unseen[row] = is_grey_unknown[levels]
+    if image.transparent is not None and header.mode is not MapMode.RAW:
+        cells[image.transparent[::-1]] = UNKNOWN
     if unseen is not None and unseen[cells == FREE].all():
-        unseen = None  # the whole floor is of this grey: someone drew it so
-    cells.flags.writeable = False  # or the grid would copy them
+        unseen = None  # the whole floor is of this grey: drawn on purpose
+    cells.flags.writeable = False  # otherwise the grid copies them
     return OccupancyGrid(cells, header.resolution, header.T_map_grid, unseen)
 
 
 def save_map(grid: OccupancyGrid, yaml_path: str | os.PathLike[str]) -> Path:
-    """Write a map that `load_map` gives back cell by cell.
+    """Write a map; `load_map` returns the same cells.
 
     The image is a PGM beside the YAML. Maps of only free, occupied and unknown cells are written in
-    mode trinary, which everything reads; others in mode raw, whose greys are the cells themselves.
-    Both files appear whole or not at all, the image first.
+    mode trinary, which every server reads; others in mode raw, whose greys are the cells.
+    Each file is written completely or not at all, the image first.
 
     Parameters
     ----------
     grid : OccupancyGrid
         The map.
     yaml_path : path-like
-        Where its YAML goes, with suffix .yaml or .yml; existing files are replaced.
+        Its YAML, with suffix .yaml or .yml; existing files are replaced.
 
     Returns
     -------
@@ -120,27 +120,28 @@ def save_map(grid: OccupancyGrid, yaml_path: str | os.PathLike[str]) -> Path:
     return path
 
 
-def cell_table(header: MapYaml, image: MapImage) -> NDArray[np.int8]:
-    """Give every pixel code of an image its cell.
+def cell_table(header: MapYaml, white: int) -> NDArray[np.int8]:
+    """Return the cell for every brightness.
 
     Parameters
     ----------
     header : MapYaml
         Mode, thresholds and negation.
-    image : MapImage
-        How bright each code is.
+    white : int
+        Brightness of white.
 
     Returns
     -------
-    ndarray of int8, shape (n_codes,)
+    ndarray of int8, shape (white + 1,)
         -1 unknown, 0 free ... 100 occupied.
     """
-    cells = np.full(len(image.levels), UNKNOWN, np.int8)
+    levels = np.arange(white + 1)
     if header.mode is MapMode.RAW:
         # Brightness in 8 bits, rounded half up in integers; negate plays no part, as in Nav2.
-        raw = (2 * 255 * image.levels + image.white) // (2 * image.white)
+        raw = (2 * 255 * levels + white) // (2 * white)
         return np.where(raw <= OCCUPIED, raw, UNKNOWN).astype(np.int8)
-    p = occupancy(header, image)
+    cells = np.full(len(levels), UNKNOWN, np.int8)
+    p = occupancy(header, white)
     free, occupied = header.free_thresh, header.occupied_thresh
     cells[p >= occupied] = OCCUPIED
     cells[p <= free] = FREE
@@ -150,20 +151,12 @@ def cell_table(header: MapYaml, image: MapImage) -> NDArray[np.int8]:
     return cells
 
 
-def occupancy(header: MapYaml, image: MapImage) -> NDArray[np.float64]:
-    """Return the occupancy of every pixel code, 0 to 1, before any threshold."""
-    occupied = image.levels if header.negate else image.white - image.levels
-    # One division of integers: the nearest float, so that a threshold of 0.2 meets grey 204.
-    p: NDArray[np.float64] = occupied / image.white
+def occupancy(header: MapYaml, white: int) -> NDArray[np.float64]:
+    """Return the occupancy for every brightness, 0 to 1, before any threshold."""
+    levels = np.arange(white + 1)
+    # One division of integers gives the nearest float: a threshold of 0.2 equals grey 204.
+    p: NDArray[np.float64] = (levels if header.negate else levels[::-1]) / white
     return p
-
-
-def to_cells(strip: Strip, table: NDArray[np.int8], mode: MapMode) -> NDArray[np.int8]:
-    """Turn some rows of pixels into cells, in the order of the image."""
-    cells: NDArray[np.int8] = table[strip.codes]
-    if strip.transparent is not None and mode is not MapMode.RAW:
-        cells[strip.transparent] = UNKNOWN
-    return cells
 
 
 def _is_trinary(grid: OccupancyGrid) -> bool:

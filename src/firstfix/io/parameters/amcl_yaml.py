@@ -1,26 +1,24 @@
-"""Settings of AMCL from a parameter file of Nav2, read as they are or refused."""
+"""Settings of AMCL from a parameter file of Nav2."""
 
 from __future__ import annotations
 
 import difflib
-import math
 import os
+import sys
 from dataclasses import fields
 from enum import Enum
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from firstfix.amcl.config import AmclConfig, MotionModel
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
-from firstfix.io.maps.files import show
+from firstfix.io.atomic_files import show
 from firstfix.io.parameters.ros1_amcl import ros1_remedy
 from firstfix.io.parameters.ros_parameters import read_parameters
-from firstfix.io.safe_yaml import kind, to_flag, to_number
+from firstfix.io.safe_yaml import kind
 
-# What every node has, what only saves memory, and what chooses threads in Beluga: nothing in them
+# Parameters of every node, those that only save memory, and the threads of Beluga: none of them
 # changes a pose. The part before the first dot counts.
 IGNORED = frozenset(
     {
@@ -49,13 +47,8 @@ DEFAULTS: dict[str, Any] = {
     entry.name: entry.default for entry in fields(AmclConfig) if entry.name != "initial_pose"
 } | _POSE
 """Of all parameters, by the flat names of ROS."""
-# Above, a float64 may not be the integer that the file says.
+# Above, a float64 may differ from the integer in the file.
 _MAX_INTEGER = 2**53
-# What PyYAML finds in plain scalars by itself; other tags were written by somebody with a plan.
-_TAGS = frozenset(
-    f"tag:yaml.org,2002:{name}" for name in ("bool", "float", "int", "str", "timestamp", "value")
-)
-_NULL = "tag:yaml.org,2002:null"
 
 
 def load_amcl_config(path: str | os.PathLike[str]) -> AmclConfig:
@@ -72,7 +65,7 @@ def load_amcl_config(path: str | os.PathLike[str]) -> AmclConfig:
     Returns
     -------
     AmclConfig
-        Nav2's defaults for what the file does not say.
+        Nav2's defaults for all parameters that the file does not set.
 
     Raises
     ------
@@ -82,9 +75,9 @@ def load_amcl_config(path: str | os.PathLike[str]) -> AmclConfig:
     """
     path = Path(path)
     values = {}
-    for name, node in read_parameters(path, "amcl", frozenset(DEFAULTS)).items():
+    for name, value in read_parameters(path, "amcl", frozenset(DEFAULTS)).items():
         if name.partition(".")[0] not in IGNORED:
-            values[name] = _value(name, node, path)
+            values[name] = _checked(name, value, path)
     try:
         return amcl_config(values)
     except InputError as error:
@@ -94,58 +87,42 @@ def load_amcl_config(path: str | os.PathLike[str]) -> AmclConfig:
 
 
 def amcl_config(values: dict[str, Any]) -> AmclConfig:
-    """Make settings of some of `DEFAULTS`, by their names; raises InputError if out of range."""
+    """Return settings from some of `DEFAULTS` by name; raises InputError if out of range."""
     x, y, _, yaw = (values.get(name, default) for name, default in _POSE.items())
     settings = {name: value for name, value in values.items() if name not in _POSE}
     return AmclConfig(initial_pose=SE2(x, y, yaw), **settings)
 
 
-def _value(name: str, node: yaml.Node, path: Path) -> Any:
+def _checked(name: str, value: Any, path: Path) -> Any:
     if name not in DEFAULTS:
-        raise _unknown(name, node, path)
+        raise _unknown(name, value, path)
     default = DEFAULTS[name]
-    quoted = getattr(node, "style", None) is not None
-    plain = isinstance(node, yaml.ScalarNode) and node.tag in _TAGS
-    value = _read(str(node.value).strip(), default, quoted=quoted) if plain else None
-    if value is None:
+    converted = _converted(value, default)
+    if converted is None:
+        quotes = "" if isinstance(default, str) else ", without quotes"
         raise InputError(
             expected=f"{name} as {_wanted(default)} in {path}",
-            received=_told(node, quoted=quoted),
-            remedy=f"write it like '{name}: {_written(default)}'",
+            received=kind(value),
+            remedy=f"write it like '{name}: {_written(default)}'{quotes}",
         )
-    return value
+    return converted
 
 
-def _told(node: yaml.Node, *, quoted: bool) -> str:
-    if not isinstance(node, yaml.ScalarNode):
-        return kind(node)
-    if node.tag == _NULL:
-        return "nothing"
-    if node.tag not in _TAGS:
-        return f"{kind(node)} with the tag {show(node.tag)}"
-    return kind(node) + (" in quotes" if quoted else "")
-
-
-def _read(text: str, default: Any, *, quoted: bool) -> Any:
-    """Read a value of the type of the default; None where it is of another one, as to ROS."""
+def _converted(value: Any, default: Any) -> Any:
+    """Return a value in the type of the default; None if ROS would reject its type."""
     if isinstance(default, Enum):
-        return choices(default).get(text)
-    number = to_number(text)
-    if isinstance(default, str):
-        bare_word = math.isnan(number) and to_flag(text) is None
-        return text if text and (quoted or bare_word) else None
-    if quoted:
+        return choices(default).get(value) if isinstance(value, str) else None
+    if isinstance(default, (str, bool)):
+        return value if type(value) is type(default) and value != "" else None
+    if type(value) not in (int, float) or not abs(value) <= sys.float_info.max:
         return None
-    if isinstance(default, bool):
-        return to_flag(text)
     if isinstance(default, int):
-        fits = number.is_integer() and abs(number) <= _MAX_INTEGER
-        return int(number) if fits else None
-    return number if math.isfinite(number) else None
+        return int(value) if value == int(value) and abs(value) <= _MAX_INTEGER else None
+    return float(value)
 
 
 def choices(default: Enum) -> dict[str, Enum]:
-    """Return what may be written for a setting, and what it means."""
+    """Return the names of the values of a setting, with the values."""
     listed: dict[str, Enum] = {choice.value: choice for choice in type(default)}
     return listed | _OLD_MODELS if isinstance(default, MotionModel) else listed
 
@@ -163,11 +140,10 @@ def _written(default: Any) -> str:
     return f'"{default}"' if isinstance(default, str) else str(default).lower()
 
 
-def _unknown(name: str, node: yaml.Node, path: Path) -> InputError:
-    text = str(node.value) if isinstance(node, yaml.ScalarNode) else ""
+def _unknown(name: str, value: Any, path: Path) -> InputError:
     near = difflib.get_close_matches(name, [*DEFAULTS, *IGNORED], 1)
     nearest = f"the nearest is {near[0]}" if near else "delete the line, or check the file"
-    remedy = ros1_remedy(name, text) or nearest
+    remedy = ros1_remedy(name, str(value)) or nearest
     if name == "initial_pose":
         remedy = "write 'initial_pose: {x: 0.0, y: 0.0, yaw: 0.0}'"
     return InputError(

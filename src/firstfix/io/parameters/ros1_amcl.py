@@ -1,6 +1,6 @@
-"""What AMCL for ROS 1 called its parameters, for those who bring their old file along.
+"""Parameter names of AMCL for ROS 1, for users with an old file.
 
-Nothing is translated silently: the noise of the odometry, for one, is not the same number.
+Nothing is translated silently: for example, the noise of the odometry is a different number.
 """
 
 from __future__ import annotations
@@ -48,19 +48,9 @@ _MODELS = {
 
 
 def ros1_remedy(name: str, text: str) -> str | None:
-    """Say what to write instead of a parameter of ROS 1.
+    """Return what to write instead of a parameter of ROS 1, which has the value `text`.
 
-    Parameters
-    ----------
-    name : str
-        The parameter in the file.
-    text : str
-        Its value, as written; empty where it is no scalar.
-
-    Returns
-    -------
-    str or None
-        What to do; None where ROS 1 had no such parameter, or Nav2 still has it.
+    None if ROS 1 had no such parameter, or Nav2 still has it.
     """
     if name in GONE:
         return "delete the line; only AMCL for ROS 1 has this parameter"
@@ -71,6 +61,6 @@ def ros1_remedy(name: str, text: str) -> str | None:
         model = _MODELS.get(text, _MODELS["diff"])
         return f"Nav2 has {new} instead: write '{new}: {model}'"
     if name.startswith("odom_alpha"):
-        # ROS 1 took the variance for the deviation, and kept doing so in `diff` and `omni`.
+        # ROS 1 confused variance and standard deviation, and still does in `diff` and `omni`.
         return f"Nav2 calls it {new}; a value tuned for a model without '-corrected' will not fit"
     return f"Nav2 calls it {new}"

@@ -1,7 +1,7 @@
 """The parameters of one node in a ROS 2 parameter file, by their dotted names.
 
-The forms that ROS 2 reads: ``node: ros__parameters:``, below namespaces or with them in the name,
-and wildcards (``/**``) that stand for all nodes. Nothing but the parameters is read, too.
+The forms are those of ROS 2: ``node: ros__parameters:``, below namespaces or with them in the name,
+and wildcards (``/**``) for all nodes; also a file with nothing but the parameters.
 """
 
 from __future__ import annotations
@@ -9,13 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-
-import yaml
+from typing import Any
 
 from firstfix.core.errors import InputError
-from firstfix.io.atomic_files import read_bytes
-from firstfix.io.maps.files import show
-from firstfix.io.safe_yaml import entries, kind, parse_yaml
+from firstfix.io.atomic_files import read_bytes, show
+from firstfix.io.safe_yaml import entries, kind, load_mapping
 
 # Nav2's own file for all its nodes has 15 kB; parsing takes up to a second for 32 kB.
 MAX_PARAMETER_BYTES = 131_072
@@ -23,15 +21,15 @@ MAX_PARAMETER_BYTES = 131_072
 _PARAMETERS = "ros__parameters"
 _WILDCARDS = ("*", "**")
 
-Parameters = dict[str, yaml.Node]
+Parameters = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class _Section:
-    """What stands under one ``ros__parameters``, and the full name of the node it is for."""
+    """The content of one ``ros__parameters``, and the full name of its node."""
 
     name: str
-    content: yaml.Node
+    content: Any
 
     @property
     def node(self) -> str:
@@ -39,7 +37,7 @@ class _Section:
 
 
 def read_parameters(path: Path, node: str, known: frozenset[str]) -> Parameters:
-    """Read what a parameter file says to one node.
+    """Read the parameters of one node.
 
     Parameters
     ----------
@@ -48,23 +46,22 @@ def read_parameters(path: Path, node: str, known: frozenset[str]) -> Parameters:
     node : str
         Name of the node, without namespace.
     known : frozenset of str
-        Names of its parameters. By them a wildcard, and a file without sections, are recognised
-        as meant for this node.
+        Names of its parameters. A wildcard, or a file without sections, is for this node if it has
+        one of them.
 
     Returns
     -------
-    dict of str to yaml.Node
-        Scalars and lists by dotted name. Unknown names are among them, but not those of a wildcard
-        beside a section of the node's own. Where both give a parameter, the later one counts, as
-        in ROS.
+    dict of str to object
+        Values by dotted name. Unknown names are included, except those of a wildcard beside a
+        section of the node's own. If both set a parameter, the later one counts, as in ROS.
 
     Raises
     ------
     InputError
-        If the file is none, or has no section for this node, or more than one.
+        If the file cannot be used, or has no section for this node, or more than one.
     """
     data = read_bytes(path, what="a YAML file of parameters", limit=MAX_PARAMETER_BYTES)
-    root = parse_yaml(data, path, example=f"{node}:")
+    root = load_mapping(data, path, example=f"{node}:")
     sections = list(_sections(root, "", path))
     if not sections and _is_plain(entries(root, path), known):
         return _flat(root, path)
@@ -89,16 +86,16 @@ def read_parameters(path: Path, node: str, known: frozenset[str]) -> Parameters:
     return merged
 
 
-def _sections(mapping: yaml.MappingNode, name: str, path: Path) -> Iterator[_Section]:
+def _sections(mapping: dict[Any, Any], name: str, path: Path) -> Iterator[_Section]:
     for key, value in entries(mapping, path).items():
         if key == _PARAMETERS:
             yield _Section(name, value)
-        elif isinstance(value, yaml.MappingNode):
+        elif isinstance(value, dict):
             yield from _sections(value, f"{name}/{key.strip('/')}", path)
 
 
 def _section_parameters(section: _Section, path: Path) -> Parameters:
-    if not isinstance(section.content, yaml.MappingNode):
+    if not isinstance(section.content, dict):
         raise InputError(
             expected=f"parameters below {_PARAMETERS} of {show(section.name)} in {path}",
             received=kind(section.content),
@@ -107,11 +104,11 @@ def _section_parameters(section: _Section, path: Path) -> Parameters:
     return _flat(section.content, path)
 
 
-def _flat(mapping: yaml.MappingNode, path: Path) -> Parameters:
-    """Name the scalars and lists of nested mappings as ROS does, with dots."""
+def _flat(mapping: dict[Any, Any], path: Path) -> Parameters:
+    """Flatten nested mappings; the names get dots, as in ROS."""
     flat: Parameters = {}
     for key, value in entries(mapping, path).items():
-        inner = _flat(value, path) if isinstance(value, yaml.MappingNode) else None
+        inner = _flat(value, path) if isinstance(value, dict) else None
         named = {key: value} if inner is None else {f"{key}.{k}": v for k, v in inner.items()}
         if twice := flat.keys() & named:
             raise InputError(
@@ -124,15 +121,13 @@ def _flat(mapping: yaml.MappingNode, path: Path) -> Parameters:
 
 
 def _is_plain(root: Parameters, known: frozenset[str]) -> bool:
-    """Tell whether these are parameters themselves rather than nodes that have some."""
+    """Return whether these are parameters, not nodes with parameters."""
     first = {name.partition(".")[0] for name in known}
-    return any(
-        not isinstance(value, yaml.MappingNode) or key in first for key, value in root.items()
-    )
+    return any(not isinstance(value, dict) or key in first for key, value in root.items())
 
 
 def _not_one(
-    path: Path, node: str, names: list[str], sections: list[_Section], root: yaml.MappingNode
+    path: Path, node: str, names: list[str], sections: list[_Section], root: dict[Any, Any]
 ) -> InputError:
     if names:
         return InputError(
