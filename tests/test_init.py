@@ -50,11 +50,11 @@ PUBLIC = [
     "load_map",
     "load_recording",
     "load_trajectory",
+    "precompile",
     "save_map",
     "save_recording",
     "save_trajectory",
     "simulate_drive",
-    "warm_up",
 ]
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
         Status,
         TrackedPose,
     )
-    from firstfix.localizer.precompile import warm_up
+    from firstfix.localizer.precompile import precompile
     from firstfix.localizer.states import Event, State
 
 __version__ = "0.1.0"
@@ -81,11 +81,11 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "load_map",
     "load_recording",
     "load_trajectory",
+    "precompile",
     "save_map",
     "save_recording",
     "save_trajectory",
     "simulate_drive",
-    "warm_up",
 ]
 
 # A name is imported at its first use: numba alone takes longer than 0.3 s to import.
@@ -111,7 +111,7 @@ _MODULES = {
     "localizer.inputs": ("NewMap", "NoMotionUpdate", "PoseHint", "Reset"),
     "localizer.localizer": ("Localizer",),
     "localizer.outputs": ("Hypotheses", "InitialPose", "MotionRequest", "Status", "TrackedPose"),
-    "localizer.precompile": ("warm_up",),
+    "localizer.precompile": ("precompile",),
     "localizer.states": ("Event", "State"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}

@@ -1,4 +1,4 @@
-"""What the warm-up leaves for the first scan: nothing to compile."""
+"""After `precompile` the first scans of a robot compile nothing."""
 
 import subprocess
 import sys
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from firstfix.amcl.config import AmclConfig, MotionModel, SensorModel
-from firstfix.localizer.precompile import warm_up
+from firstfix.localizer.precompile import precompile
 
 # A robot is found in a hall, driven, lost and found again, and then in one of two equal rooms.
 STORY = """
@@ -15,7 +15,7 @@ import sys
 from dataclasses import replace
 import numpy as np
 from numba.core.dispatcher import Dispatcher
-from firstfix.localizer.precompile import warm_up
+from firstfix.localizer.precompile import precompile
 from firstfix.amcl.config import AmclConfig, MotionModel, SensorModel
 from firstfix.core.odometry import Odometry
 from firstfix.core.se2 import SE2
@@ -42,7 +42,7 @@ def handle(localizer, given):
     localizer.handle(given)
     late.update(name for name, n in compiled().items() if n != before.get(name, 0))
 
-warm_up(config)
+precompile(config)
 late, states = set(), set()
 lidar, rng = Lidar(beams=360), np.random.default_rng(1)
 for world in (office(), identical_rooms(2)):
@@ -61,9 +61,9 @@ assert not late, late
 """
 
 
-def test_it_says_nothing_and_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_it_returns_nothing_and_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("FIRSTFIX_CACHE_DIR", str(tmp_path))
-    assert warm_up(AmclConfig()) is None
+    assert precompile(AmclConfig()) is None
     assert list(tmp_path.iterdir()) == []
 
 

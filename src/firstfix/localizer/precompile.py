@@ -1,30 +1,45 @@
-"""Kernels made ready, so that the first scan of a robot does not wait for the compiler."""
+"""Compile or load every kernel in advance, so that the first scan does not wait for the compiler.
+
+Robots' nodes, the demo and the benchmarks use this one module.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
+
 from firstfix.amcl.config import AmclConfig
+from firstfix.core.angles import FULL_TURN
+from firstfix.core.grid import FREE, OCCUPIED, OccupancyGrid
 from firstfix.core.odometry import Odometry
+from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.fields.raycast import expected_ranges
+from firstfix.global_localization.config import Method
+from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.inputs import NewMap
 from firstfix.localizer.localizer import Localizer
-from firstfix.localizer.precompile_room import scan_of, small_room
 
-# Seen from two poses: found at one, followed there, lost and found at the other.
+RANGE_MAX = 5.0
+
+# The robot is found at the first pose, tracked there, lost and found again at the second.
 _HERE, _THERE = SE2(3.0, 2.5, 0.4), SE2(6.0, 4.5, 2.0)
 _STEP_S = 0.1
 _SCANS = 30
 
 
-def warm_up(config: AmclConfig | None = None) -> None:
-    """Load or compile all kernels that a localizer may need, by a story in a small room.
+def precompile(config: AmclConfig | None = None, methods: Iterable[Method] = ()) -> None:
+    """Run a localizer, and a search by each of some other methods, in a small room.
 
     Parameters
     ----------
     config : AmclConfig, optional
-        Its sensor and motion model choose among the kernels.
+        Its sensor model and motion model choose among the kernels.
+    methods : iterable of Method
+        Methods of search besides the default one.
     """
     localizer = Localizer(LocalizerConfig(amcl=config or AmclConfig()))
     grid = small_room()
@@ -35,3 +50,21 @@ def warm_up(config: AmclConfig | None = None) -> None:
         localizer.handle(Odometry(stamp, SE2(0.05 * i, 0.0, 0.0)))
         at = _HERE if i < _SCANS // 2 else _THERE
         localizer.handle(replace(scan_of(grid, at), stamp=stamp))
+    for method in methods:
+        ScanMatcher(grid, method=method).locate(scan_of(grid, _HERE))
+
+
+def small_room() -> OccupancyGrid:
+    """Return a room of 8 x 6 m with a pillar, its corner at the origin."""
+    cells = np.full((120, 160), FREE, np.int8)
+    cells[[0, -1], :] = cells[:, [0, -1]] = OCCUPIED
+    cells[30:50, 100:120] = OCCUPIED
+    return OccupancyGrid(cells, 0.05)
+
+
+def scan_of(grid: OccupancyGrid, T_map_base: SE2) -> LaserScan:
+    """Return the scan of a perfect sensor with 180 beams all round."""
+    bearings = np.linspace(-FULL_TURN / 2, FULL_TURN / 2, 180, endpoint=False)
+    ranges = expected_ranges(grid, T_map_base, bearings, RANGE_MAX).astype(np.float32)
+    step = float(bearings[1] - bearings[0])
+    return LaserScan(ranges, float(bearings[0]), step, range_min=0.1, range_max=RANGE_MAX)

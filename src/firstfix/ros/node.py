@@ -19,7 +19,7 @@ from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Output
-from firstfix.localizer.precompile import warm_up
+from firstfix.localizer.precompile import precompile
 from firstfix.ros.channels import Heard, heard_topics
 from firstfix.ros.inbox import Inbox
 from firstfix.ros.message_converter import MessageConverter
@@ -139,7 +139,7 @@ class Node:
         self._try(self._memory.close)
 
     def _make_ready(self) -> None:
-        warm_up(self._config.amcl)
+        precompile(self._config.amcl)
         if self._own_map is not None:
             self._give(self._intake.use_map(self._own_map))
 

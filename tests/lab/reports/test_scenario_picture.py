@@ -10,7 +10,7 @@ from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.lab.reports.scenario_picture import draw_scenario
 from firstfix.lab.scenarios.episodes import DemoStep
-from firstfix.localizer.precompile_room import small_room
+from firstfix.localizer.precompile import small_room
 
 
 def story() -> list[DemoStep]:

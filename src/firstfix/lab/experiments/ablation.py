@@ -41,7 +41,7 @@ from firstfix.lab.experiments.case_runs import try_scan
 from firstfix.lab.metrics.metrics import summarize, total
 from firstfix.lab.metrics.outcome import Outcome
 from firstfix.lab.reports.tables import Row, columns_table
-from firstfix.localizer.precompile_room import scan_of, small_room
+from firstfix.localizer.precompile import scan_of, small_room
 
 # Title, key in the document, format.
 COLUMNS = (

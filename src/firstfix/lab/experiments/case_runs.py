@@ -16,7 +16,7 @@ from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.lab.experiments.case import Case, evenly_spaced, known_truth
 from firstfix.lab.experiments.process_pool import peak_rss_mb
 from firstfix.lab.metrics.outcome import Outcome, best_probability, judge
-from firstfix.localizer.precompile_room import scan_of, small_room
+from firstfix.localizer.precompile import scan_of, small_room
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ from firstfix.lab.worlds.catalog import WORLDS
 from firstfix.localizer.inputs import NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import InitialPose, Output, Status, TrackedPose
-from firstfix.localizer.precompile_room import scan_of, small_room
+from firstfix.localizer.precompile import scan_of, small_room
 from firstfix.localizer.replay import replay
 from firstfix.localizer.states import State
 

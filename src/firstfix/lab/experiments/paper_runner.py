@@ -25,7 +25,7 @@ from firstfix.lab.worlds.paper_rooms import laboratory, two_corridors
 from firstfix.localizer.inputs import NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Output, TrackedPose
-from firstfix.localizer.precompile_room import small_room
+from firstfix.localizer.precompile import small_room
 from firstfix.localizer.replay import replay
 
 PAPER_WORLDS: dict[str, Callable[[], OccupancyGrid]] = {

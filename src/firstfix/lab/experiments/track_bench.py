@@ -26,7 +26,7 @@ from firstfix.lab.experiments.process_pool import peak_rss_mb, run_in_processes
 from firstfix.lab.metrics.metrics import mean_of_known
 from firstfix.lab.metrics.track_metrics import TrackFigures, summarize_track
 from firstfix.lab.reports.tables import Row, columns_table
-from firstfix.localizer.precompile_room import scan_of, small_room
+from firstfix.localizer.precompile import scan_of, small_room
 
 COUNTS = frozenset({"n", "updates"})
 

@@ -13,10 +13,9 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.cache import cache_folder
 from firstfix.lab.live.steered_robot import SimRobot
 from firstfix.lab.simulation.simulation import PERIOD_S
-from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
-from firstfix.localizer.precompile import warm_up
+from firstfix.localizer.precompile import precompile
 from firstfix.ros.inbox import Inbox
 from firstfix.ros.node import Watcher
 
@@ -81,7 +80,7 @@ class SimNode:
         self._inbox.put(given)
 
     def _live(self) -> None:
-        warm_up(LocalizerConfig().amcl)
+        precompile()
         self._try(self._handle, NewMap(0.0, self._grid))
         due = time.monotonic()
         while not self._inbox.is_closed:

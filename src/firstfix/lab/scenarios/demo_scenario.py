@@ -15,7 +15,7 @@ from firstfix.lab.simulation.simulation import Disturbance
 from firstfix.localizer.inputs import NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import InitialPose, Output, Status, TrackedPose
-from firstfix.localizer.precompile_room import small_room
+from firstfix.localizer.precompile import small_room
 from firstfix.localizer.replay import replay
 
 # A robot wakes, drives to two goals, is picked up and carried, drives on, and is somewhere else
