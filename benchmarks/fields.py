@@ -19,7 +19,7 @@ import numpy as np
 from firstfix.core.grid import OccupancyGrid
 from firstfix.fields.cache import content_key, load_or_build
 from firstfix.fields.endpoint_field import build_endpoint_field
-from firstfix.fields.map_fields import build_fields
+from firstfix.fields.map_fields import MapFields
 from firstfix.fields.range_table import build_range_table
 from firstfix.fields.search_grid import build_search_grid
 from firstfix.io.maps.map_server import load_map
@@ -40,7 +40,7 @@ def main() -> None:
 
 
 def time_search_fields(grid: OccupancyGrid, runs: int) -> None:
-    fields = build_fields(grid, None)
+    fields = MapFields(grid)
     positions, resolution = fields.positions, grid.resolution
     show("positions of the search", runs, lambda: build_search_grid(grid))
     show(
@@ -53,7 +53,12 @@ def time_search_fields(grid: OccupancyGrid, runs: int) -> None:
         runs,
         lambda: build_range_table(fields.clearance, resolution, positions),
     )
-    show("all fields of a map", runs, lambda: build_fields(grid, None))
+    show("all fields of a map", runs, lambda: prepared(grid))
+
+
+def prepared(grid: OccupancyGrid) -> tuple[object, ...]:
+    fields = MapFields(grid)
+    return fields.endpoints, fields.ranges
 
 
 def time_cache(grid: OccupancyGrid, runs: int) -> None:

@@ -106,7 +106,7 @@ class Hand:
             const { x, y, width, height } = button.getBoundingClientRect();
             return [x + width / 2, y + height / 2];
         }"""
-        self._go(*self._page.matcher(selector).evaluate(middle))
+        self._go(*self._page.locator(selector).evaluate(middle))
         self._page.mouse.down()
         self._page.mouse.up()
 

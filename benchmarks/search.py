@@ -24,7 +24,7 @@ import numpy as np
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
-from firstfix.fields.map_fields import MapFields, build_fields
+from firstfix.fields.map_fields import MapFields
 from firstfix.fields.range_table import DIRECTIONS
 from firstfix.global_localization import exhaustive
 from firstfix.global_localization import search as kernels
@@ -40,6 +40,7 @@ from firstfix.lab.worlds.catalog import random_free_pose
 
 # As many places as `locate` refines on the field, and on rays.
 SHORTLIST = LocateConfig().shortlist
+ALL_POSES = LocateConfig().max_poses
 ON_RAYS = 10
 
 
@@ -52,7 +53,7 @@ def main() -> None:
     path = arguments.folder
     grid = load_map(path / "map.yaml" if path.is_dir() else path)
     scan = scan_of(path, grid, arguments.index)
-    fields = build_fields(grid, None)
+    fields = MapFields(grid)
     beams = usable_beams(scan)
     print(
         f"{path}: {len(fields.positions)} positions in {len(fields.positions.tile_rows)} tiles, "
@@ -75,8 +76,13 @@ def time_steps(beams: Beams, fields: MapFields, runs: int) -> None:
     queries = kernels._queries(beams, fields)
     beams_used = queries.offsets.shape[1] + len(queries.directions)
     terms = len(fields.positions) * DIRECTIONS * beams_used
-    show("search", runs, lambda: kernels.search(beams, fields, SHORTLIST, np.inf), terms)
-    poses = kernels.search(beams, fields, SHORTLIST, np.inf)[0].poses
+    show(
+        "search",
+        runs,
+        lambda: kernels.search(beams, fields, SHORTLIST, ALL_POSES),
+        terms,
+    )
+    poses = kernels.search(beams, fields, SHORTLIST, ALL_POSES)[0].poses
     n = len(poses)
     show(f"refine_on_field, {n} poses", runs, lambda: refine_on_field(poses, beams, fields))
     refined = refine_on_field(poses, beams, fields)
@@ -87,11 +93,12 @@ def time_steps(beams: Beams, fields: MapFields, runs: int) -> None:
 
 def time_paper(beams: Beams, fields: MapFields, runs: int) -> None:
     hits, grid = beams.hits(), exhaustive.FAST
-    tried, _ = exhaustive.pose_scores(hits, fields, grid)
+    search = exhaustive.ExhaustiveSearch(fields, grid)
+    tried, _ = search.pose_scores(hits)
     show(
         f"paper, {grid.stride} x {grid.stride} x {grid.headings}",
         runs,
-        lambda: exhaustive.pose_scores(hits, fields, grid),
+        lambda: search.pose_scores(hits),
         len(tried) * grid.headings * len(hits),
     )
 

@@ -33,7 +33,7 @@ from numba.core.registry import CPUDispatcher
 
 import firstfix
 from firstfix.core.grid import OccupancyGrid
-from firstfix.fields.map_fields import build_fields
+from firstfix.fields.map_fields import MapFields
 from firstfix.io.maps.map_server import load_map
 from firstfix.lab.experiments.machine import machine_text, this_machine
 from firstfix.lab.reports.tables import markdown_table
@@ -86,7 +86,7 @@ def kernels(grid: OccupancyGrid) -> list[Kernel]:
     rng = np.random.default_rng(0)
     pose = random_free_pose(grid, rng)
     scan = Lidar().scan(grid, pose, rng)
-    fields = build_fields(grid, None)
+    fields = MapFields(grid)
     return [
         *of_fields.kernels(fields, rng),
         *of_search.kernels(fields, scan),

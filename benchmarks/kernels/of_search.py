@@ -23,13 +23,14 @@ from firstfix.global_localization.config import LocateConfig
 
 # As many places as `locate` refines on the field, and on rays.
 SHORTLIST = LocateConfig().shortlist
+ALL_POSES = LocateConfig().max_poses
 ON_RAYS = 10
 
 
 def kernels(fields: MapFields, scan: LaserScan) -> list[Kernel]:
     """All of firstfix.global_localization, on one scan; poses are those that the search finds."""
     beams = usable_beams(scan)
-    found = search.search(beams, fields, SHORTLIST, np.inf)[0].poses
+    found = search.search(beams, fields, SHORTLIST, ALL_POSES)[0].poses
     refined = refine.refine_on_field(found, beams, fields)
     scores = verify.verify(refined, beams, fields).scores
     best = refined[np.argsort(scores)[:ON_RAYS]]
@@ -140,9 +141,8 @@ def _touched(base: int, pitch: int, offsets: NDArray[np.int64]) -> float:
 
 def _lowest(fields: MapFields, hits: Beams) -> Kernel:
     grid = exhaustive.FAST
-    exhaustive.pose_scores(hits, fields, grid)  # lays out the field
     cells = hits.ranges / fields.grid.resolution
-    field = fields.layouts[grid.stride]
+    field = exhaustive.ExhaustiveSearch(fields, grid).layout(float(cells.max()))
     angles = hits.bearings + np.arange(grid.headings)[:, None] * (2 * np.pi / grid.headings)
     offsets = field.offsets(
         grid.stride / 2 + cells * np.sin(angles), grid.stride / 2 + cells * np.cos(angles)
@@ -269,7 +269,7 @@ def _verify(refined: NDArray[np.float64], beams: Beams, fields: MapFields) -> Ke
 
 
 def _suppress(fields: MapFields, hits: Beams) -> Kernel:
-    tried, scores = exhaustive.pose_scores(hits, fields, exhaustive.FAST)
+    tried, scores = exhaustive.ExhaustiveSearch(fields, exhaustive.FAST).pose_scores(hits)
     order = np.argsort(scores, kind="stable")
     near = places.SEPARATION_M / fields.grid.resolution, places.SEPARATION_RAD
     most = SHORTLIST  # of the ten that the paper publishes, only the call would be seen

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -254,6 +255,23 @@ def test_what_explains_a_beam_is_told_once_not_for_every_scan(monkeypatch):
     assert seen[0] is seen[1]
     assert seen[0].size == field.squares.size
     assert not seen[0].flags.writeable
+
+
+def test_sensors_of_two_ranges_keep_their_tables(monkeypatch):
+    """A table is as large as the map: scans of two sensors alternate and rebuild none."""
+    built = []
+
+    def spy(*arguments):
+        built.append(arguments[2])
+        return likelihoods(*arguments)
+
+    monkeypatch.setattr(likelihood_field, "likelihoods", spy)
+    grid, config = drawn(), AmclConfig()
+    field = LikelihoodField(grid, config)
+    scans = [scan_of(30, 1), dataclasses.replace(scan_of(30, 2), range_max=7.0)]
+    for scan in scans * 3:
+        field.log_likelihood(somewhere(grid, 50), select_beams(scan, config))
+    assert sorted(built) == sorted({scan.range_max for scan in scans})
 
 
 def test_beams_are_skipped_by_one_model_only():

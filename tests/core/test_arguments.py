@@ -87,7 +87,7 @@ def test_enums_and_poses_of_the_inputs_are_converted() -> None:
 WRONG: list[tuple[str, Callable[[ff.OccupancyGrid, ff.ScanMatcher], Any]]] = [
     ("fast, paper, paper-basic", lambda grid, _: ff.ScanMatcher(grid, method="quick")),
     (r"ff\.load_map\('map\.yaml'\)", lambda *_: ff.ScanMatcher("map.yaml")),
-    ("LocateConfig", lambda grid, _: ff.ScanMatcher(grid, config={"budget_s": 1})),
+    ("LocateConfig", lambda grid, _: ff.ScanMatcher(grid, config={"max_poses": 1})),
     (r"ff\.LaserScan\(ranges, angle_min", lambda _, matcher: matcher.locate(np.zeros(360))),
     ("LaserScan", lambda _, matcher: matcher.search_locally([1.0], (0, 0, 0))),
     ("metres and radians", lambda _, matcher: matcher.search_locally(scan(), (0, 0))),

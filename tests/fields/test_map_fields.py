@@ -13,7 +13,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fields import map_fields
 from firstfix.fields.clearance import chessboard_clearance
 from firstfix.fields.distance import euclidean_distance, manhattan_distance
-from firstfix.fields.map_fields import NEAR_M, MapFields, build_fields
+from firstfix.fields.map_fields import NEAR_M, MapFields
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +26,9 @@ def grid() -> OccupancyGrid:
 
 
 def arrays_of(fields: MapFields) -> dict[str, NDArray[np.generic]]:
-    found = {"distances": fields.distances, "pointscore": fields.pointscore}
-    for part in (fields, fields.positions, fields.endpoints):
+    names = ("squares", "distances", "clearance", "pointscore", "ranges")
+    found = {name: getattr(fields, name) for name in names}
+    for part in (fields.positions, fields.endpoints):
         for field in dataclasses.fields(part):
             value = getattr(part, field.name)
             if isinstance(value, np.ndarray):
@@ -44,23 +45,23 @@ def assert_equal(a: MapFields, b: MapFields) -> None:
 
 
 def test_with_a_cache_it_is_the_same_as_without(grid, tmp_path):
-    fresh = build_fields(grid, None)
-    assert_equal(fresh, build_fields(grid, tmp_path / "cache"))  # builds
-    assert_equal(fresh, build_fields(grid, tmp_path / "cache"))  # reads
+    fresh = MapFields(grid)
+    assert_equal(fresh, MapFields(grid, tmp_path / "cache"))  # builds
+    assert_equal(fresh, MapFields(grid, tmp_path / "cache"))  # reads
 
 
 def test_the_second_time_no_ray_is_cast(grid, tmp_path, monkeypatch):
-    build_fields(grid, tmp_path)
+    _ = MapFields(grid, tmp_path).ranges
 
     def never(*_: object) -> None:
         raise AssertionError("the cache was not read")
 
     monkeypatch.setattr(map_fields, "build_range_table", never)
-    build_fields(grid, tmp_path)
+    _ = MapFields(grid, tmp_path).ranges
 
 
 def test_another_map_has_its_own_cache(grid, tmp_path):
-    build_fields(grid, tmp_path)
+    _ = MapFields(grid, tmp_path).ranges
     cells = grid.cells.copy()
     cells[50, 20] = OCCUPIED
     unseen = np.zeros(cells.shape, np.bool_)
@@ -70,37 +71,46 @@ def test_another_map_has_its_own_cache(grid, tmp_path):
         OccupancyGrid(grid.cells, 0.1),
         OccupancyGrid(grid.cells, 0.05, unseen=unseen),
     ):
-        assert_equal(build_fields(other, None), build_fields(other, tmp_path))
+        assert_equal(MapFields(other), MapFields(other, tmp_path))
 
 
 def test_where_the_map_lies_does_not_matter_to_the_cache(grid, tmp_path):
-    build_fields(grid, tmp_path)
+    _ = MapFields(grid, tmp_path).ranges
     files = list(tmp_path.iterdir())
     assert len(files) == 1
-    build_fields(OccupancyGrid(grid.cells, grid.resolution, SE2(5.0, -3.0, 1.0)), tmp_path)
+    _ = MapFields(OccupancyGrid(grid.cells, grid.resolution, SE2(5.0, -3.0, 1.0)), tmp_path).ranges
     assert list(tmp_path.iterdir()) == files
 
 
 def test_a_damaged_cache_is_built_again(grid, tmp_path):
-    fresh = build_fields(grid, tmp_path)
+    fresh = MapFields(grid, tmp_path)
+    _ = fresh.ranges
     (file,) = tmp_path.iterdir()
     content = bytearray(file.read_bytes())
     content[len(content) // 2] ^= 0xFF
     file.write_bytes(content)
-    assert_equal(fresh, build_fields(grid, tmp_path))
+    assert_equal(fresh, MapFields(grid, tmp_path))
+
+
+def test_a_field_that_is_not_read_is_not_computed(grid, monkeypatch):
+    built = []
+    monkeypatch.setattr(map_fields, "build_range_table", lambda *_: built.append("ranges"))
+    fields = MapFields(grid)
+    fields.compute("pointscore", "squares", "clearance")
+    assert not built
 
 
 @pytest.mark.parametrize("cached", [False, True])
 def test_shared_arrays_cannot_be_written(grid, tmp_path, cached):
     for _ in range(2):  # with a cache: built, then read
-        fields = build_fields(grid, tmp_path if cached else None)
+        fields = MapFields(grid, tmp_path if cached else None)
         for array in (fields.squares, fields.clearance, fields.endpoints.values, fields.ranges):
             with pytest.raises(ValueError, match="read-only"):
                 array[...] = 0
 
 
 def test_distances_are_those_of_the_map(grid):
-    fields = build_fields(grid, None)
+    fields = MapFields(grid)
     near = np.float32(fields.near)
     np.testing.assert_array_equal(
         fields.distances[fields.squares], np.minimum(euclidean_distance(grid.occupied), near)
@@ -115,6 +125,6 @@ def test_distances_are_those_of_the_map(grid):
 def test_any_size_of_cell_can_be_prepared(resolution):
     cells = np.zeros((300, 60), np.int8)
     cells[0] = OCCUPIED
-    fields = build_fields(OccupancyGrid(cells, resolution), None)
+    fields = MapFields(OccupancyGrid(cells, resolution))
     assert fields.squares.max() <= fields.near**2
     assert len(fields.distances) == fields.near**2 + 1

@@ -14,7 +14,7 @@ from firstfix.core.estimate import LocateResult
 from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.fields.map_fields import MapFields, build_fields
+from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.lab.worlds.catalog import office
 
@@ -48,7 +48,7 @@ def draw_room() -> Callable[[float], OccupancyGrid]:
 
 @pytest.fixture(scope="session")
 def room(draw_room: Callable[[float], OccupancyGrid]) -> MapFields:
-    return build_fields(draw_room(0.05), None)
+    return MapFields(draw_room(0.05))
 
 
 @pytest.fixture(scope="session")

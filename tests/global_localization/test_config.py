@@ -14,8 +14,8 @@ from firstfix.global_localization.config import LocateConfig, Method
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("budget_s", -0.1),
-        ("budget_s", math.nan),
+        ("max_poses", 0),
+        ("max_poses", 1.5),
         ("shortlist", 0),
         ("hypotheses", 1),
         ("unique_probability", -0.01),
@@ -32,8 +32,8 @@ def test_a_setting_out_of_range_is_named(name, value):
     "settings",
     [
         {},
-        {"budget_s": 0.0},
-        {"budget_s": math.inf},
+        {"max_poses": 1},
+        {"max_poses": 2**53},
         {"shortlist": 1, "hypotheses": 2},
         {"unique_probability": 0.0},
         {"unique_probability": 1.0},
@@ -47,7 +47,7 @@ def test_the_ends_of_every_range_are_allowed(settings):
 
 def test_settings_do_not_change():
     with pytest.raises(dataclasses.FrozenInstanceError):
-        LocateConfig().budget_s = 1.0  # type: ignore[misc]
+        LocateConfig().max_poses = 1  # type: ignore[misc]
 
 
 def test_methods_have_the_names_of_the_command_line():

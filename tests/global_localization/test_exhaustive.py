@@ -15,11 +15,10 @@ from firstfix.core.estimate import Verdict
 from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.fields.map_fields import MapFields, build_fields
+from firstfix.fields.map_fields import MapFields
 from firstfix.fields.raycast import cast_rays, expected_ranges
-from firstfix.global_localization import exhaustive
 from firstfix.global_localization.beams import Beams
-from firstfix.global_localization.exhaustive import BASIC, FAST, PoseGrid, pose_scores
+from firstfix.global_localization.exhaustive import BASIC, FAST, ExhaustiveSearch, PoseGrid
 
 # As coarse as this, every free cell is a place to be, so that maps can be tiny.
 CELL_M = 0.25
@@ -32,7 +31,7 @@ def random_fields(seed: int, height: int, width: int) -> MapFields:
     )
     wall, floor = rng.choice(cells.size, 2, replace=False)
     cells.flat[wall], cells.flat[floor] = OCCUPIED, FREE
-    return build_fields(OccupancyGrid(cells, CELL_M), None)
+    return MapFields(OccupancyGrid(cells, CELL_M))
 
 
 def random_hits(seed: int, n: int, longest: float) -> Beams:
@@ -75,7 +74,7 @@ def nearest_wall(walls: NDArray[np.int64], y: int, x: int) -> int:
 
 
 def assert_same(hits: Beams, fields: MapFields, poses: PoseGrid) -> None:
-    tried, scores = pose_scores(hits, fields, poses)
+    tried, scores = ExhaustiveSearch(fields, poses).pose_scores(hits)
     slow_tried, slow_scores = triple_loop(hits, fields, poses)
     np.testing.assert_array_equal(scores, slow_scores)
     np.testing.assert_array_equal(tried, slow_tried)
@@ -114,8 +113,8 @@ def test_only_blocks_with_a_free_cell_are_tried():
     cells = np.full((9, 10), OCCUPIED, np.int8)
     cells[0, 0] = cells[5, 9] = FREE
     cells[8] = UNKNOWN
-    fields = build_fields(OccupancyGrid(cells, CELL_M), None)
-    tried, scores = pose_scores(random_hits(0, 3, 5.0), fields, FAST)
+    fields = MapFields(OccupancyGrid(cells, CELL_M))
+    tried, scores = ExhaustiveSearch(fields, FAST).pose_scores(random_hits(0, 3, 5.0))
     assert tried[:, :2].tolist() == [[2.0, 2.0], [10.0, 6.0]]
     assert len(scores) == 2
 
@@ -125,18 +124,18 @@ def test_blocks_that_nobody_has_seen_are_not_tried():
     cells[0, 0] = OCCUPIED
     unseen = np.zeros(cells.shape, np.bool_)
     unseen[:, 4:] = True
-    fields = build_fields(OccupancyGrid(cells, CELL_M, unseen=unseen), None)
-    tried, _ = pose_scores(random_hits(0, 3, 5.0), fields, FAST)
+    fields = MapFields(OccupancyGrid(cells, CELL_M, unseen=unseen))
+    tried, _ = ExhaustiveSearch(fields, FAST).pose_scores(random_hits(0, 3, 5.0))
     assert tried[:, :2].tolist() == [[2.0, 2.0]]
 
 
 def test_of_equal_headings_the_first_wins():
     cells = np.zeros((9, 9), np.int8)
     cells[4, 4] = OCCUPIED
-    fields = build_fields(OccupancyGrid(cells, 1.0), None)
+    fields = MapFields(OccupancyGrid(cells, 1.0))
     # A beam of no length scores alike in every heading.
     hits = Beams(np.zeros(1), np.array([1e-6]), np.ones(1, np.bool_))
-    tried, scores = pose_scores(hits, fields, PoseGrid(1, 24))
+    tried, scores = ExhaustiveSearch(fields, PoseGrid(1, 24)).pose_scores(hits)
     assert (tried[:, 2] == 0.0).all()
     assert scores.reshape(-1)[0] == 8
 
@@ -150,7 +149,7 @@ def test_a_scan_from_a_pose_of_the_grid_scores_zero_there_and_is_found(room, pos
     cells = cast_rays(room.grid.occupied, x, y, heading + bearings, 1e3)
     # A little beyond the face of the wall, or rounding decides for the free side of it.
     hits = Beams(bearings, (cells + 0.01) * 0.05, np.ones(180, np.bool_))
-    tried, scores = pose_scores(hits, room, poses)
+    tried, scores = ExhaustiveSearch(room, poses).pose_scores(hits)
     best = int(np.argmin(scores))
     # A beam through the last corner of a cell may end one further.
     assert scores[best] <= 2
@@ -169,7 +168,7 @@ def scan_at(fields: MapFields, T_map_base: SE2, range_max: float = 30.0) -> Lase
 @pytest.mark.parametrize("poses", [FAST, BASIC])
 def test_the_answer_of_the_paper(room, poses):
     truth = SE2(4.9, 5.1, math.radians(45.0))
-    result = exhaustive.locate(scan_at(room, truth), room, poses)
+    result = ExhaustiveSearch(room, poses).locate(scan_at(room, truth))
     assert result.verdict is Verdict.UNIQUE
     assert result.search.proven
     assert result.search.searched == 1.0
@@ -189,7 +188,7 @@ def test_the_answer_of_the_paper(room, poses):
 
 def test_the_score_is_the_mean_over_the_beams(room):
     scan = scan_at(room, SE2(4.9, 5.1, 0.0))
-    best = exhaustive.locate(scan, room, FAST).best
+    best = ExhaustiveSearch(room, FAST).locate(scan).best
     assert best is not None
     assert best.score * len(scan) == pytest.approx(round(best.score * len(scan)))
 
@@ -201,19 +200,19 @@ def test_beams_without_a_return_take_no_part(room):
     assert scan.no_return.any()
     invalid = np.where(scan.no_return, np.nan, scan.ranges).astype(np.float32)
     blind = LaserScan(invalid, scan.angle_min, scan.angle_increment, 0.05, 4.0)
-    there, here = (exhaustive.locate(s, room, FAST) for s in (scan, blind))
+    there, here = (ExhaustiveSearch(room, FAST).locate(s) for s in (scan, blind))
     assert [h.score for h in there.hypotheses] == [h.score for h in here.hypotheses]
     assert [h.pose for h in there.hypotheses] == [h.pose for h in here.hypotheses]
 
 
 def test_a_scan_without_hits_matches_nothing(room):
     scan = LaserScan(np.full(20, np.inf, np.float32), 0.0, 0.1, 0.1, 5.0)
-    assert exhaustive.locate(scan, room, FAST).verdict is Verdict.NO_MATCH
+    assert ExhaustiveSearch(room, FAST).locate(scan).verdict is Verdict.NO_MATCH
 
 
 def test_twice_is_the_same(room):
     scan = scan_at(room, SE2(3.3, 3.0, 2.0))
-    first, second = (exhaustive.locate(scan, room, FAST) for _ in range(2))
+    first, second = (ExhaustiveSearch(room, FAST).locate(scan) for _ in range(2))
     assert [(h.pose, h.score) for h in first.hypotheses] == [
         (h.pose, h.score) for h in second.hypotheses
     ]

@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from firstfix.core.angles import FULL_TURN, angle_error
-from firstfix.global_localization.places import SEPARATION_M, SEPARATION_RAD, distinct_places
+from firstfix.core.se2 import SE2
+from firstfix.global_localization.places import (
+    SAME_PLACE_M,
+    SAME_PLACE_RAD,
+    distinct_places,
+    is_same_place,
+)
 
 RESOLUTION = 0.05
 
@@ -26,7 +32,7 @@ def poses_of(seed: int, n: int, spread_m: float) -> tuple[NDArray[np.float64], N
 
 def near(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
     distance = math.hypot(*(a[:2] - b[:2])) * RESOLUTION
-    return distance <= SEPARATION_M and angle_error(float(a[2]), float(b[2])) <= SEPARATION_RAD
+    return distance <= SAME_PLACE_M and angle_error(float(a[2]), float(b[2])) <= SAME_PLACE_RAD
 
 
 crowds = st.builds(
@@ -99,3 +105,18 @@ def test_the_limits_of_one_place(apart_m, a, b, places):
 
 def test_no_pose_no_place():
     assert distinct_places(np.empty((0, 3)), np.empty(0), RESOLUTION, 5).tolist() == []
+
+
+@pytest.mark.parametrize(
+    ("off", "same"),
+    [
+        (SE2(0.49, 0.0, 0.0), True),
+        (SE2(0.0, 0.51, 0.0), False),
+        (SE2(0.3, -0.3, math.radians(19.0)), True),
+        (SE2(0.0, 0.0, math.radians(-21.0)), False),
+    ],
+)
+@pytest.mark.parametrize("pose", [SE2(0.0, 0.0, 0.0), SE2(-3.0, 8.0, 3.1)])
+def test_the_same_place_is_half_a_metre_and_twenty_degrees(pose, off, same):
+    assert is_same_place(pose, pose @ off) is same
+    assert is_same_place(pose @ off, pose) is same

@@ -10,7 +10,7 @@ from firstfix.core.angles import wrap
 from firstfix.core.grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.fields.map_fields import MapFields, build_fields
+from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import Beams, usable_beams
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.lab.simulation.lidar import Lidar
@@ -144,7 +144,7 @@ def corridor(request) -> tuple[MapFields, int]:
     along = 0
     if request.param == "north":
         cells, along = cells.T.copy(), 1
-    return build_fields(OccupancyGrid(np.pad(cells, 4, constant_values=UNKNOWN), 0.05), None), along
+    return MapFields(OccupancyGrid(np.pad(cells, 4, constant_values=UNKNOWN), 0.05)), along
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.6, 2.5])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 
@@ -182,12 +183,25 @@ def test_a_map_of_one_kind_is_no_map(value, method):
         ScanMatcher(OccupancyGrid(np.full((20, 30), value, np.int8), 0.05), method=method)
 
 
-# --- time ---
+# --- limited search ---
 
 
-def test_without_time_it_never_publishes(office_locator, maps_cache):
+@pytest.mark.parametrize("max_poses", [1, LocateConfig().max_poses])
+def test_the_answer_does_not_depend_on_the_clock(
+    office_locator, maps_cache, told, monkeypatch, max_poses
+):
+    grid, rng = office_locator.fields.grid, np.random.default_rng(0)
+    matcher = ScanMatcher(grid, config=LocateConfig(max_poses=max_poses), cache_dir=maps_cache)
+    scan = LIDAR.scan(grid, random_free_pose(grid, rng), rng)
+    idle = told(matcher.locate(scan))
+    hours = itertools.count(0.0, 3600.0)
+    monkeypatch.setattr("time.perf_counter", lambda: next(hours))
+    assert told(matcher.locate(scan)) == idle
+
+
+def test_a_search_cut_short_is_never_unique(office_locator, maps_cache):
     grid = office_locator.fields.grid
-    hurried = ScanMatcher(grid, config=LocateConfig(budget_s=0.0), cache_dir=maps_cache)
+    hurried = ScanMatcher(grid, config=LocateConfig(max_poses=1), cache_dir=maps_cache)
     for seed in range(5):
         rng = np.random.default_rng(seed)
         scan = LIDAR.scan(grid, random_free_pose(grid, rng), rng)
@@ -199,6 +213,17 @@ def test_without_time_it_never_publishes(office_locator, maps_cache):
 
 
 # --- methods ---
+
+
+@pytest.mark.parametrize("method", [Method.PAPER, Method.PAPER_BASIC])
+def test_the_methods_of_the_paper_build_no_table_of_ranges(method, room, monkeypatch):
+    def never(*_: object) -> None:
+        raise AssertionError("a table of ranges was built")
+
+    monkeypatch.setattr("firstfix.fields.map_fields.build_range_table", never)
+    rng = np.random.default_rng(0)
+    scan = LIDAR.scan(room.grid, random_free_pose(room.grid, rng), rng)
+    ScanMatcher(room.grid, method=method).locate(scan)
 
 
 @pytest.mark.parametrize("method", [Method.PAPER, Method.PAPER_BASIC])

@@ -12,12 +12,12 @@ from firstfix.core.angles import angle_error
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan, Mounting
 from firstfix.core.se2 import SE2
-from firstfix.fields.map_fields import MapFields, build_fields
+from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import usable_beams
 from firstfix.global_localization.frames import to_cells
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.global_localization.scoring import classify_beams, score_poses, search_locally
-from firstfix.global_localization.verify import verify
+from firstfix.global_localization.verify import BEAMS, BeamClass, verify
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import random_free_poses
 
@@ -27,7 +27,7 @@ FAR_M, FAR_RAD = 1.0, math.radians(45.0)
 
 @pytest.fixture(scope="session")
 def hall(hall_plan: OccupancyGrid) -> MapFields:
-    return build_fields(hall_plan, None)
+    return MapFields(hall_plan)
 
 
 @pytest.fixture(scope="session")
@@ -130,7 +130,7 @@ def test_move_map_and_poses_together_and_nothing_changes(hall):
     moved_by = SE2(-20.0, 7.0, 2.2)
     grid = hall.grid
     moved_grid = OccupancyGrid(grid.cells, grid.resolution, moved_by @ grid.T_map_grid)
-    elsewhere = build_fields(moved_grid, None)
+    elsewhere = MapFields(moved_grid)
     truth, *others = drawn(hall, 6, seed=4)
     scan = seen(hall, truth)
     poses = [truth @ SE2(0.1, 0.0, 0.05), *others]
@@ -212,12 +212,32 @@ def test_what_a_hand_over_the_sensor_leaves_is_not_found_within_a_wall(office_fi
         assert not grid.occupied[row, column] or place.score > 2.3
 
 
-def test_all_beams_are_sorted_and_few_enough_as_they_are_counted(hall):
+@pytest.mark.parametrize("outside", [SE2(1000.0, 0.0, 0.0), SE2(0.0, -50.0, 1.0)])
+def test_a_pose_far_outside_the_map_has_probability_zero(hall, outside):
+    """Open space in most directions costs little anywhere: there it proves nothing."""
     (pose,) = drawn(hall, 1)
     scan = seen(hall, pose)
+    far = np.where(np.arange(len(scan)) % 8 == 0, scan.ranges, np.inf).astype(np.float32)
+    scan = LaserScan(far, scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max)
+    (place,) = score_poses(scan, [outside], hall)
+    assert place.probability == 0.0
+
+
+@pytest.mark.parametrize("n", [90, 180, 720])
+def test_classes_of_beams_have_the_shares_of_the_evidence(hall, n):
+    (pose,) = drawn(hall, 1)
+    scan = seen(hall, pose, Lidar(beams=n, range_max=4.0))
     (judged,) = score_poses(scan, [pose], hall)
-    classes = classify_beams(scan, judged.pose, hall)
-    assert len(classes) == len(usable_beams(scan)) == judged.evidence.beams
-    shares = np.bincount(classes, minlength=4) / len(classes)
-    e = judged.evidence
-    assert shares.tolist() == [e.explained, e.short, e.through_wall, e.unknown]
+    beams, e = classify_beams(scan, judged.pose, hall), judged.evidence
+    assert len(beams.classes) == len(beams.ends) == len(beams.hit) == e.beams <= BEAMS
+    shares = [beams.share(kind) for kind in BeamClass]
+    assert shares == [e.explained, e.short, e.through_wall, e.unknown]
+
+
+def test_hits_end_at_the_points_of_the_scan(hall):
+    (pose,) = drawn(hall, 1)
+    scan = seen(hall, pose)
+    beams = classify_beams(scan, pose, hall)
+    points = pose.apply(scan.points())
+    for end in beams.ends[beams.hit]:
+        assert np.hypot(*(points - end).T).min() < 1e-6

@@ -14,9 +14,10 @@ from firstfix.core.angles import FULL_TURN, angle_error
 from firstfix.core.grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.fields import endpoint_field, range_table
-from firstfix.fields.map_fields import MapFields, build_fields
+from firstfix.fields.map_fields import MapFields
 from firstfix.fields.range_table import DIRECTIONS
 from firstfix.global_localization.beams import Beams, by_direction, usable_beams
+from firstfix.global_localization.config import LocateConfig
 from firstfix.global_localization.search import (
     ENDPOINT_BEAMS,
     NO_RETURN_LIMIT,
@@ -32,6 +33,7 @@ from firstfix.lab.simulation.lidar import Lidar
 UNIT = 2.0**-23  # metres that the integer scores count
 PLACE = 2  # positions to the side of a place of the shortlist
 ALL = 10**6
+ALL_POSES = LocateConfig().max_poses
 
 
 def random_map(seed: int, height: int, width: int, resolution: float) -> OccupancyGrid:
@@ -154,9 +156,9 @@ seeds = st.integers(0, 2**32 - 1)
     st.sampled_from([1, 7, ALL]),
 )
 def test_fast_equals_slow(seed, shape, resolution, n, hit_share, longest_m, shortlist):
-    fields = build_fields(random_map(seed, *shape, resolution), None)
+    fields = MapFields(random_map(seed, *shape, resolution))
     beams = random_beams(seed, n, hit_share, longest_m)
-    candidates, report = search(beams, fields, shortlist, math.inf)
+    candidates, report = search(beams, fields, shortlist, ALL_POSES)
     assert report.proven
     assert report.searched == pytest.approx(1.0) or len(fields.positions) == 0
     assert report.poses == len(fields.positions) * DIRECTIONS
@@ -170,7 +172,7 @@ def test_fast_equals_slow(seed, shape, resolution, n, hit_share, longest_m, shor
 def test_any_few_beams(n, room):
     """Kernels take beams by fours and twelves; what is left over counts as well."""
     beams = random_beams(n, n, 0.8, 6.0)
-    assert_same(search(beams, room, 50, math.inf)[0], slow_search(beams, room, 50))
+    assert_same(search(beams, room, 50, ALL_POSES)[0], slow_search(beams, room, 50))
 
 
 @pytest.mark.parametrize("hit", [True, False])
@@ -178,7 +180,7 @@ def test_beams_longer_than_the_reach(hit, room):
     n = 40
     bearings = np.linspace(-3.0, 3.0, n)
     beams = Beams(bearings, np.full(n, range_table.REACH_M + 1.0), np.full(n, hit))
-    candidates, report = search(beams, room, 20, math.inf)
+    candidates, report = search(beams, room, 20, ALL_POSES)
     assert report.proven
     assert_same(candidates, slow_search(beams, room, 20))
 
@@ -186,7 +188,7 @@ def test_beams_longer_than_the_reach(hit, room):
 @pytest.fixture(scope="module")
 def tiles() -> MapFields:
     """More than one look at the clock, and rows of several tiles."""
-    fields = build_fields(random_map(5, 90, 200, 0.25), None)
+    fields = MapFields(random_map(5, 90, 200, 0.25))
     assert len(fields.positions.tile_rows) > 16
     return fields
 
@@ -194,7 +196,7 @@ def tiles() -> MapFields:
 @pytest.mark.slow
 def test_many_tiles(tiles):
     beams = random_beams(5, 9, 0.7, 10.0)
-    candidates, report = search(beams, tiles, 300, math.inf)
+    candidates, report = search(beams, tiles, 300, ALL_POSES)
     assert report.proven
     assert_same(candidates, slow_search(beams, tiles, 300))
 
@@ -205,13 +207,13 @@ def test_a_turn_of_all_bearings_changes_nothing(turns, room):
     bearings = (np.arange(-50, 50) + 0.3) * step  # away from where directions meet
     ranges = np.random.default_rng(1).uniform(0.3, 7.0, len(bearings))
     hit = np.ones(len(bearings), np.bool_)
-    there, _ = search(Beams(bearings, ranges, hit), room, 20, math.inf)
-    back, _ = search(Beams(bearings + turns * FULL_TURN, ranges, hit), room, 20, math.inf)
+    there, _ = search(Beams(bearings, ranges, hit), room, 20, ALL_POSES)
+    back, _ = search(Beams(bearings + turns * FULL_TURN, ranges, hit), room, 20, ALL_POSES)
     assert_same(back, there)
 
 
 def test_candidates_come_best_first_and_separate(room):
-    candidates, _ = search(random_beams(3, 90, 0.9, 6.0), room, 200, math.inf)
+    candidates, _ = search(random_beams(3, 90, 0.9, 6.0), room, 200, ALL_POSES)
     assert len(candidates.poses) == 200
     assert (np.diff(candidates.scores) >= 0.0).all()
     blocks = (candidates.poses[:, :2] // (PLACE * room.positions.stride)).astype(int)
@@ -228,16 +230,16 @@ def test_the_true_place_is_among_the_first(seed, room):
     heading = rng.uniform(-np.pi, np.pi)
     truth = SE2(column * 0.05, row * 0.05, heading)
     scan = Lidar(beams=180, sigma_m=0.02).scan(room.grid, truth, rng)
-    candidates, _ = search(usable_beams(scan), room, 5, math.inf)
+    candidates, _ = search(usable_beams(scan), room, 5, ALL_POSES)
     distance = np.hypot(candidates.poses[:, 0] - column, candidates.poses[:, 1] - row) * 0.05
     turn = angle_error(candidates.poses[:, 2], heading)
     assert ((distance < 0.3) & (turn < np.radians(5.0))).any()
 
 
-def test_without_time_it_says_what_it_left_and_gives_what_it_saw(tiles):
+def test_a_search_cut_short_reports_its_share_and_keeps_the_best_it_scored(tiles):
     beams = random_beams(5, 30, 0.7, 10.0)
-    every, _ = search(beams, tiles, ALL, math.inf)
-    some, report = search(beams, tiles, ALL, 0.0)
+    every, _ = search(beams, tiles, ALL, ALL_POSES)
+    some, report = search(beams, tiles, ALL, 1)
     assert not report.proven
     assert 0.0 < report.searched < 1.0
     assert report.poses == len(tiles.positions) * DIRECTIONS
@@ -253,9 +255,18 @@ def test_without_time_it_says_what_it_left_and_gives_what_it_saw(tiles):
     assert len(inside) >= 0.9 * len(some.poses)
 
 
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.99])
+def test_max_poses_limits_the_poses_scored(tiles, share):
+    beams, every = random_beams(5, 30, 0.7, 10.0), len(tiles.positions) * DIRECTIONS
+    _, report = search(beams, tiles, ALL, round(share * every))
+    assert 0.0 < report.searched <= share
+    assert not report.proven
+    assert search(beams, tiles, ALL, every)[1].proven
+
+
 def test_the_scan_is_not_changed(room):
     beams = random_beams(2, 50, 0.8, 6.0)
     before = [array.copy() for array in (beams.bearings, beams.ranges, beams.hit)]
-    search(beams, room, 10, math.inf)
+    search(beams, room, 10, ALL_POSES)
     for array, copy in zip((beams.bearings, beams.ranges, beams.hit), before, strict=True):
         np.testing.assert_array_equal(array, copy)

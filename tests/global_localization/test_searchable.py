@@ -5,7 +5,7 @@ import pytest
 
 from firstfix.core.errors import MapError
 from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from firstfix.fields.map_fields import build_fields
+from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.searchable import check_positions, check_searchable
 
 
@@ -31,5 +31,5 @@ def test_free_space_must_be_wide_enough_to_stand_in():
     narrow = np.full((30, 30), OCCUPIED, np.int8)
     narrow[:, 1] = FREE  # 5 cm wide
     with pytest.raises(MapError, match="30 free cells"):
-        check_positions(build_fields(OccupancyGrid(narrow, 0.05), None))
-    check_positions(build_fields(OccupancyGrid(narrow, 0.25), None))
+        check_positions(MapFields(OccupancyGrid(narrow, 0.05)))
+    check_positions(MapFields(OccupancyGrid(narrow, 0.25)))

@@ -10,7 +10,12 @@ from hypothesis.extra.numpy import arrays
 
 from firstfix.core.estimate import Evidence, Verdict
 from firstfix.core.scan import LaserScan
-from firstfix.global_localization.verdict import judge, nothing_to_match, place_probabilities
+from firstfix.global_localization.verdict import (
+    count_rivals,
+    judge,
+    nothing_to_match,
+    place_probabilities,
+)
 
 costs = arrays(np.float64, st.integers(1, 30), elements=st.floats(0.0, 8.0)).map(np.sort)
 GOOD = Evidence(explained=0.9, short=0.08, through_wall=0.02, unknown=0.0, beams=180)
@@ -138,3 +143,19 @@ def test_a_scan_with_too_few_hits_is_answered_with_their_number(n, hits, needed)
     assert result.best is None
     assert not result.search.proven
     assert result.elapsed_s == 0.25
+
+
+@pytest.mark.parametrize(
+    ("probabilities", "rivals"),
+    [
+        ([1.0], 1),
+        ([0.93, 0.06, *[0.001] * 8], 1),  # ten are listed
+        ([0.6, 0.3, 0.07, 0.03], 3),
+        ([0.25] * 4, 4),
+        ([0.01, 0.9], 1),
+    ],
+)
+def test_places_fit_about_as_well_from_a_tenth_of_the_best(probabilities, rivals):
+    assert count_rivals(np.array(probabilities)) == rivals
+    _, reason = judge(np.sort(probabilities)[::-1], GOOD, 1.1)
+    assert (f"{rivals} places fit" in reason) is (rivals > 1)

@@ -8,16 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firstfix.core.grid import OCCUPIED, UNKNOWN, OccupancyGrid
-from firstfix.fields.map_fields import MapFields, build_fields
+from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import Beams
-from firstfix.global_localization.verify import (
-    EXPLAINED,
-    SHORT,
-    THROUGH,
-    classes_of_beams,
-    verify,
-)
-from firstfix.global_localization.verify import UNKNOWN as IN_UNKNOWN
+from firstfix.global_localization.verify import BeamClass, beam_classes, verify
 
 RESOLUTION = 0.05
 
@@ -31,7 +24,7 @@ def yard() -> MapFields:
     cells = np.zeros((160, 200), np.int8)
     cells[:100, 120:124] = OCCUPIED
     cells[100:] = UNKNOWN
-    return build_fields(OccupancyGrid(cells, RESOLUTION), None)
+    return MapFields(OccupancyGrid(cells, RESOLUTION))
 
 
 def beam(bearing: float, range_m: float, *, hit: bool = True) -> Beams:
@@ -41,19 +34,19 @@ def beam(bearing: float, range_m: float, *, hit: bool = True) -> Beams:
 NORTH, EAST, WEST = np.pi / 2, 0.0, np.pi
 
 ONE_BEAM = [
-    (EAST, 4.02, True, EXPLAINED),
-    (EAST, 3.9, True, EXPLAINED),
-    (EAST, 4.15, True, EXPLAINED),
-    (EAST, 2.5, True, SHORT),
-    (EAST, 1.0, True, SHORT),
-    (EAST, 5.5, True, THROUGH),
-    (EAST, 30.0, True, THROUGH),  # through it and out of the map
-    (NORTH, 4.0, True, IN_UNKNOWN),
-    (WEST, 15.0, True, IN_UNKNOWN),  # outside the map
-    (NORTH, 1.0, True, SHORT),  # something stands where the map is free
-    (WEST, 10.0, False, EXPLAINED),  # nothing there, and nothing returned
-    (EAST, 3.0, False, EXPLAINED),  # the reach ends before the wall
-    (EAST, 10.0, False, THROUGH),  # a wall is there, and nothing returned
+    (EAST, 4.02, True, BeamClass.EXPLAINED),
+    (EAST, 3.9, True, BeamClass.EXPLAINED),
+    (EAST, 4.15, True, BeamClass.EXPLAINED),
+    (EAST, 2.5, True, BeamClass.SHORT),
+    (EAST, 1.0, True, BeamClass.SHORT),
+    (EAST, 5.5, True, BeamClass.THROUGH_WALL),
+    (EAST, 30.0, True, BeamClass.THROUGH_WALL),  # through it and out of the map
+    (NORTH, 4.0, True, BeamClass.UNKNOWN),
+    (WEST, 15.0, True, BeamClass.UNKNOWN),  # outside the map
+    (NORTH, 1.0, True, BeamClass.SHORT),  # something stands where the map is free
+    (WEST, 10.0, False, BeamClass.EXPLAINED),  # nothing there, and nothing returned
+    (EAST, 3.0, False, BeamClass.EXPLAINED),  # the reach ends before the wall
+    (EAST, 10.0, False, BeamClass.THROUGH_WALL),  # a wall is there, and nothing returned
 ]
 
 
@@ -61,15 +54,15 @@ ONE_BEAM = [
 def test_one_beam(yard, bearing, range_m, hit, kind):
     counts = verify(SENSOR, beam(bearing, range_m, hit=hit), yard).counts
     assert counts.tolist() == [[int(k == kind) for k in range(4)]]
-    assert classes_of_beams(SENSOR[0], beam(bearing, range_m, hit=hit), yard).tolist() == [kind]
+    assert beam_classes(SENSOR[0], beam(bearing, range_m, hit=hit), yard).tolist() == [kind]
 
 
 def test_what_nobody_has_seen_is_unknown_whatever_the_thresholds_say(yard):
     unseen = np.zeros(yard.grid.cells.shape, np.bool_)
     unseen[:, :70] = True  # up to x = 3.5 m; the beam ends at 3 m
     grid = OccupancyGrid(yard.grid.cells, RESOLUTION, unseen=unseen)
-    counts = verify(SENSOR, beam(EAST, 1.0), build_fields(grid, None)).counts
-    assert counts[0, IN_UNKNOWN] == 1
+    counts = verify(SENSOR, beam(EAST, 1.0), MapFields(grid)).counts
+    assert counts[0, BeamClass.UNKNOWN] == 1
 
 
 @pytest.mark.parametrize("quarter", range(4))

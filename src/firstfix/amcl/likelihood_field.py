@@ -6,6 +6,7 @@ Thrun, Burgard & Fox, "Probabilistic Robotics" (2005), table 6.3, with the param
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
@@ -21,6 +22,9 @@ from firstfix.fields.distance import MAX_LIMIT, truncated_squares
 # vectorised without leave to reorder floating point. 20 000 beams stay within 31 bits.
 _UNIT = 2.0**-12
 _LEAST_LIKELIHOOD = 1e-9
+
+# Sensors with range limits of their own whose tables are kept.
+_SENSORS = 4
 
 # Particles a kernel takes at a time: their coordinates and sums stay in the nearest cache.
 _BLOCK = 256
@@ -43,7 +47,8 @@ class LikelihoodField:
         limit = math.ceil(config.laser_likelihood_max_dist / grid.resolution)
         self.limit = max(1, min(MAX_LIMIT, limit))
         self.squares = _labelled_squares(grid, self.limit, config)
-        self._values = (math.nan, np.empty(0, np.int32))
+        # As large as the map each: of the robot's sensors, not of every range limit ever seen.
+        self._table = lru_cache(maxsize=_SENSORS)(self._build_table)
         prob = config.laser_model_type is SensorModel.LIKELIHOOD_FIELD_PROB
         # As large as the map: not for those who skip nothing, and not anew for every scan.
         self._explained = self._near_walls() if prob and config.do_beamskip else None
@@ -79,17 +84,13 @@ class LikelihoodField:
         height, width = self.squares.shape
         return height, width
 
-    def _table(self, range_max: float) -> NDArray[np.int32]:
-        """Return the logarithm for each cell, flat, in integer units; kept for the next scan."""
-        # Looked at once: another thread may put the table of its own sensor there meanwhile.
-        kept = self._values
-        if kept[0] != range_max:
-            by_square = likelihoods(self.limit, self.grid.resolution, range_max, self.config)
-            logs = np.log(np.maximum(by_square, _LEAST_LIKELIHOOD)) / _UNIT
-            table = np.rint(logs).astype(np.int32)[self.squares].ravel()
-            table.flags.writeable = False
-            kept = self._values = (range_max, table)
-        return kept[1]
+    def _build_table(self, range_max: float) -> NDArray[np.int32]:
+        """Return the log-likelihood of an end point in each cell, flat, in integer units."""
+        by_square = likelihoods(self.limit, self.grid.resolution, range_max, self.config)
+        logs = np.log(np.maximum(by_square, _LEAST_LIKELIHOOD)) / _UNIT
+        table: NDArray[np.int32] = np.rint(logs).astype(np.int32)[self.squares].ravel()
+        table.flags.writeable = False
+        return table
 
     def _near_walls(self) -> NDArray[np.int32]:
         """Return 1 for each cell that explains an end point, else 0; flat."""

@@ -83,7 +83,7 @@ class SearchReport:
     poses : int
         Number of poses the search decided on.
     searched : float
-        Share of them that was decided before the time budget was spent, 0 to 1.
+        Share of them that was scored, 0 to 1; less than 1 only with a small ``max_poses``.
     proven : bool
         True if no pose of the search grid has a lower search score than the best one found.
     """

@@ -1,4 +1,4 @@
-"""Everything a search needs to know of a map, computed once."""
+"""Everything that the map alone determines: computed on first use, then kept."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,38 +31,38 @@ NEAR_M = 1.0
 
 @dataclass(frozen=True, eq=False)
 class MapFields:
-    """A map, prepared.
+    """A map, and the fields derived from it, each computed when it is first read.
+
+    Threads may share it: two that read a field for the first time at once both compute the same.
 
     Parameters
     ----------
     grid : OccupancyGrid
         The map itself.
-    squares : ndarray of uint16, shape (height, width)
-        Squared Euclidean distance to the nearest wall, cells², up to ``near`` squared.
-    clearance : ndarray of uint8, shape (height, width)
-        Distance to the nearest wall as a king walks, cells; rays leap by it.
-    near : int
-        Distance from which on ``squares`` no longer grows, cells.
-    positions : SearchGrid
-        The positions that a search looks at.
-    endpoints : PhasedField
-        Truncated distances, by phases.
-    ranges : ndarray of uint8, shape (n_positions, 2 * DIRECTIONS)
-        Expected ranges at the positions.
+    cache_dir : Path or None
+        Folder of range tables from earlier runs; None computes in memory.
     """
 
     grid: OccupancyGrid
-    squares: NDArray[np.uint16]
-    clearance: NDArray[np.uint8]
-    near: int
-    positions: SearchGrid
-    endpoints: PhasedField
-    ranges: NDArray[np.uint8]
+    cache_dir: Path | None = None
+
+    def compute(self, *names: str) -> None:
+        """Compute these fields now, so that no scan waits for them."""
+        for name in names:
+            getattr(self, name)
+
+    @property
+    def near(self) -> int:
+        """Distance at which ``squares`` saturates, cells."""
+        return min(MAX_LIMIT, math.ceil(NEAR_M / self.grid.resolution) + 1)
 
     @cached_property
-    def layouts(self) -> dict[int, PhasedField]:
-        """The widest layout of ``pointscore`` made so far, by its stride."""
-        return {}
+    def squares(self) -> NDArray[np.uint16]:
+        """Squared Euclidean distance to the nearest wall, cells², at most ``near²``.
+
+        Shape (height, width).
+        """
+        return _read_only(truncated_squares(self.grid.occupied, self.near))
 
     @cached_property
     def distances(self) -> NDArray[np.float32]:
@@ -69,60 +70,47 @@ class MapFields:
         return np.sqrt(np.arange(self.near**2 + 1)).astype(np.float32)
 
     @cached_property
+    def clearance(self) -> NDArray[np.uint8]:
+        """Chessboard distance to the nearest wall, cells, by which rays leap; (height, width)."""
+        return _read_only(chessboard_clearance(self.grid.occupied))
+
+    @cached_property
     def pointscore(self) -> NDArray[np.uint16]:
         """Manhattan distance to the nearest wall, shape (height, width), cells (paper, Fig. 10)."""
         return manhattan_distance(self.grid.occupied)
 
+    @cached_property
+    def positions(self) -> SearchGrid:
+        """The positions of the search."""
+        return build_search_grid(self.grid)
 
-def build_fields(grid: OccupancyGrid, cache_dir: Path | None) -> MapFields:
-    """Prepare a map, or fetch what an earlier run prepared.
+    @cached_property
+    def endpoints(self) -> PhasedField:
+        """Truncated distances, by phases."""
+        field = build_endpoint_field(
+            self.squares, self.grid.resolution, self.positions.stride, REACH_M
+        )
+        _read_only(field.values)
+        return field
 
-    Parameters
-    ----------
-    grid : OccupancyGrid
-        The map.
-    cache_dir : Path or None
-        Folder of prepared maps; None prepares in memory.
+    @cached_property
+    def ranges(self) -> NDArray[np.uint8]:
+        """Expected ranges at the positions, shape (n_positions, 2 * DIRECTIONS)."""
+        # The only field that takes longer to build than to read from disk.
+        if self.cache_dir is None:
+            return _read_only(self._build_ranges()["ranges"])
+        settings = repr(
+            (self.grid.resolution, SPACING_M, MAX_POSITIONS, DIRECTIONS, UNIT_M, REACH_M)
+        )
+        key = cache.content_key("range table 1", self.grid.occupied, self.grid.seen_free, settings)
+        return _read_only(cache.load_or_build(key, self._build_ranges, self.cache_dir)["ranges"])
 
-    Returns
-    -------
-    MapFields
-        The prepared map.
-    """
-    near = min(MAX_LIMIT, math.ceil(NEAR_M / grid.resolution) + 1)
-    positions = build_search_grid(grid)
-    squares = truncated_squares(grid.occupied, near)
-    clearance = chessboard_clearance(grid.occupied)
-    # Read-only throughout: shared between threads, and one type for the kernels, cached or not.
-    clearance.flags.writeable = False
-
-    ranges = _cached_range_table(clearance, grid, positions, cache_dir)
-    endpoints = build_endpoint_field(squares, grid.resolution, positions.stride, REACH_M)
-    for array in (squares, endpoints.values, ranges):
-        array.flags.writeable = False
-    return MapFields(
-        grid=grid,
-        squares=squares,
-        clearance=clearance,
-        near=near,
-        positions=positions,
-        endpoints=endpoints,
-        ranges=ranges,
-    )
+    def _build_ranges(self) -> dict[str, NDArray[np.uint8]]:
+        table = build_range_table(self.clearance, self.grid.resolution, self.positions)
+        return {"ranges": table}
 
 
-def _cached_range_table(
-    clearance: NDArray[np.uint8],
-    grid: OccupancyGrid,
-    positions: SearchGrid,
-    cache_dir: Path | None,
-) -> NDArray[np.uint8]:
-    # The only field that takes longer to build than to read.
-    def build() -> dict[str, NDArray[np.uint8]]:
-        return {"ranges": build_range_table(clearance, grid.resolution, positions)}
-
-    if cache_dir is None:
-        return build()["ranges"]
-    settings = repr((grid.resolution, SPACING_M, MAX_POSITIONS, DIRECTIONS, UNIT_M, REACH_M))
-    key = cache.content_key("range table 1", grid.occupied, grid.seen_free, settings)
-    return cache.load_or_build(key, build, cache_dir)["ranges"]
+def _read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """Make an array read-only: threads share it, and to numba it is another type otherwise."""
+    array.flags.writeable = False
+    return array

@@ -1,11 +1,13 @@
-"""What a user can choose about the static stage."""
+"""Settings of global localization."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
 
-from firstfix.core.errors import InputError
+from firstfix.core.settings import check_settings, setting
+from firstfix.fields.range_table import DIRECTIONS
+from firstfix.fields.search_grid import MAX_POSITIONS
 
 
 class Method(Enum):
@@ -18,41 +20,26 @@ class Method(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LocateConfig:
-    """Settings of the default method; every default holds for all maps and sensors.
+    """Settings of the default method; the metadata of each field has its description and range.
 
-    Parameters
-    ----------
-    budget_s : float
-        Wall time after which the search stops and says what it has not seen, s, at least 0.
-    shortlist : int
-        Places of the search that are refined, at least 1.
-    hypotheses : int
-        Most places in a result, at least 2.
-    unique_probability : float
-        Least probability of the best place for the verdict UNIQUE, 0 to 1.
+    Every default holds for all maps and sensors. ``max_poses`` limits the search by work, not by
+    time: the same scan gets the same answer on any machine and under any load. The default is the
+    largest search grid, so nothing is left out.
 
     Raises
     ------
     InputError
-        If a setting is out of its range.
+        If a setting has the wrong type or is out of its range.
     """
 
-    budget_s: float = 30.0
-    shortlist: int = 150
-    hypotheses: int = 24
-    unique_probability: float = 0.95
+    max_poses: int = setting(
+        MAX_POSITIONS * DIRECTIONS, "most poses that the search scores; fewer: never UNIQUE", 1
+    )
+    shortlist: int = setting(150, "places of the search that are refined", 1, 100_000)
+    hypotheses: int = setting(24, "most places in a result", 2, 1_000)
+    unique_probability: float = setting(
+        0.95, "least probability of the best place for the verdict UNIQUE", 0.0, 1.0
+    )
 
     def __post_init__(self) -> None:
-        for name, least, most in (
-            ("budget_s", 0.0, float("inf")),
-            ("shortlist", 1, 100_000),
-            ("hypotheses", 2, 1_000),
-            ("unique_probability", 0.0, 1.0),
-        ):
-            value = getattr(self, name)
-            if not least <= value <= most:
-                raise InputError(
-                    expected=f"{name} from {least} to {most}",
-                    received=f"{value}",
-                    remedy="leave it at its default if in doubt",
-                )
+        check_settings(self)

@@ -58,114 +58,126 @@ _SUMMED_NARROW = 65535 // 8
 # Rows are summed in whole vectors.
 _CHUNK = 32
 
+# Blocks around the map in the smallest layout; doubled until the longest beam ends inside.
+_LEAST_MARGIN = 64
 
-def locate(scan: LaserScan, fields: MapFields, poses: PoseGrid) -> LocateResult:
-    """Find the pose of lowest PoseScore.
+
+class ExhaustiveSearch:
+    """Finds the pose of lowest PoseScore in one map.
+
+    Keeps the map's pointscore laid out for the longest beam seen so far: laying it out takes longer
+    than a search, and the scans of one sensor share it.
 
     Parameters
     ----------
-    scan : LaserScan
-        The scan, with the sensor's pose on the robot.
     fields : MapFields
         The prepared map.
     poses : PoseGrid
         `BASIC` (every free cell, every degree) or `FAST` (blocks of 4 x 4 cells, 15 degrees).
-
-    Returns
-    -------
-    LocateResult
-        The paper publishes the lowest pose whatever the others are: UNIQUE, with probability 1,
-        while the next lowest places are listed with probability 0; NO_MATCH if no beam hit.
     """
-    started = time.perf_counter()
-    hits = usable_beams(scan, longest_m=_longest(fields)).hits()
-    if len(hits) == 0:
-        return nothing_to_match(scan, 0, 1, time.perf_counter() - started)
-    tried, scores = pose_scores(hits, fields, poses)
-    ranked = distinct_places(tried, scores, fields.grid.resolution, _HYPOTHESES)
-    verification = verify(tried[ranked], usable_beams(scan), fields)
-    spread = np.diag([poses.stride, poses.stride, FULL_TURN / poses.headings])
-    hypotheses = tuple(
-        Hypothesis(
-            *to_map(fields.grid, scan, tried[i], spread**2 / 12.0),
-            score=float(scores[i]) / len(hits),
-            probability=1.0 if k == 0 else 0.0,
-            evidence=verification.evidence(k),
+
+    def __init__(self, fields: MapFields, poses: PoseGrid) -> None:
+        self._fields = fields
+        self._poses = poses
+        self._layout: PhasedField | None = None
+
+    def locate(self, scan: LaserScan) -> LocateResult:
+        """Find the pose of lowest PoseScore.
+
+        Parameters
+        ----------
+        scan : LaserScan
+            The scan, with the sensor's pose on the robot.
+
+        Returns
+        -------
+        LocateResult
+            The paper publishes the lowest pose whatever the others are: UNIQUE, with probability 1,
+            while the next lowest places are listed with probability 0; NO_MATCH if no beam hit.
+        """
+        started = time.perf_counter()
+        fields, poses = self._fields, self._poses
+        hits = usable_beams(scan, longest_m=_longest(fields)).hits()
+        if len(hits) == 0:
+            return nothing_to_match(scan, 0, 1, time.perf_counter() - started)
+        tried, scores = self.pose_scores(hits)
+        ranked = distinct_places(tried, scores, fields.grid.resolution, _HYPOTHESES)
+        verification = verify(tried[ranked], usable_beams(scan), fields)
+        spread = np.diag([poses.stride, poses.stride, FULL_TURN / poses.headings])
+        hypotheses = tuple(
+            Hypothesis(
+                *to_map(fields.grid, scan, tried[i], spread**2 / 12.0),
+                score=float(scores[i]) / len(hits),
+                probability=1.0 if k == 0 else 0.0,
+                evidence=verification.evidence(k),
+            )
+            for k, i in enumerate(ranked)
         )
-        for k, i in enumerate(ranked)
-    )
-    return LocateResult(
-        verdict=Verdict.UNIQUE,
-        reason="lowest PoseScore; the paper's method does not doubt it",
-        hypotheses=hypotheses,
-        search=SearchReport(len(tried) * poses.headings, 1.0, proven=True),
-        elapsed_s=time.perf_counter() - started,
-    )
+        return LocateResult(
+            verdict=Verdict.UNIQUE,
+            reason="lowest PoseScore; the paper's method does not doubt it",
+            hypotheses=hypotheses,
+            search=SearchReport(len(tried) * poses.headings, 1.0, proven=True),
+            elapsed_s=time.perf_counter() - started,
+        )
+
+    def pose_scores(self, hits: Beams) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Score every pose, and keep the best heading of each position.
+
+        Parameters
+        ----------
+        hits : Beams
+            Beams that met a surface, in the sensor frame.
+
+        Returns
+        -------
+        tried : ndarray, shape (n, 3)
+            x, y (cells), heading (rad) of the sensor in the grid, one row for each block that has a
+            free cell, in the order of rows and columns.
+        scores : ndarray of int64, shape (n,)
+            PoseScore, cells; lower is better.
+        """
+        grid = self._fields.grid
+        stride, headings = self._poses.stride, self._poses.headings
+        cells = hits.ranges / grid.resolution
+        field = self.layout(float(cells.max()))
+        angles = hits.bearings + np.arange(headings)[:, None] * (FULL_TURN / headings)
+        # The centre of a block of even side is a corner of cells: the cell above and right of it.
+        offsets = field.offsets(
+            stride / 2 + cells * np.sin(angles), stride / 2 + cells * np.cos(angles)
+        )
+        rows, columns = np.nonzero(_has_free_cell(grid.seen_free, stride))
+        spans = _spans(rows.astype(np.int32), columns.astype(np.int32))
+        best = np.empty((-(-grid.height // stride), field.columns + _CHUNK), np.int64)
+        _lowest(field.values, field.base(spans[0], spans[1]), spans, offsets, best)
+        word = best[rows, columns]
+        tried = np.column_stack(
+            [
+                columns * stride + stride / 2,
+                rows * stride + stride / 2,
+                (word % headings) * (FULL_TURN / headings),
+            ]
+        )
+        return tried, word // headings
+
+    def layout(self, longest_cells: float) -> PhasedField:
+        """Return pointscore by phases, with a margin for beams of this length, cells."""
+        stride, kept = self._poses.stride, self._layout
+        if kept is None or kept.margin * stride <= longest_cells + stride:
+            margin = _LEAST_MARGIN
+            while margin * stride <= longest_cells + stride:
+                margin *= 2
+            around = _continued(self._fields.pointscore, margin * stride)
+            if around.max() > _SUMMED_NARROW:
+                around = around.astype(np.uint32)
+            kept = self._layout = lay_out(around, 1, stride, margin)
+        return kept
 
 
 def _longest(fields: MapFields) -> float:
     # A beam that is longer than the map ends outside it wherever the robot is.
     grid = fields.grid
     return min(_LONGEST_M, math.hypot(grid.width, grid.height) * grid.resolution)
-
-
-def pose_scores(
-    hits: Beams, fields: MapFields, poses: PoseGrid
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Score every pose, and keep the best heading of each position.
-
-    Parameters
-    ----------
-    hits : Beams
-        Beams that met a surface, in the sensor frame.
-    fields : MapFields
-        The prepared map.
-    poses : PoseGrid
-        The poses to try.
-
-    Returns
-    -------
-    tried : ndarray, shape (n, 3)
-        x, y (cells), heading (rad) of the sensor in the grid, one row for each block that has a
-        free cell, in the order of rows and columns.
-    scores : ndarray of int64, shape (n,)
-        PoseScore, cells; lower is better.
-    """
-    stride, headings = poses.stride, poses.headings
-    cells = hits.ranges / fields.grid.resolution
-    field = _pointscore_field(fields, stride, float(cells.max()))
-    angles = hits.bearings + np.arange(headings)[:, None] * (FULL_TURN / headings)
-    # The centre of a block of even side is a corner of cells: the cell above and right of it.
-    offsets = field.offsets(
-        stride / 2 + cells * np.sin(angles), stride / 2 + cells * np.cos(angles)
-    )
-    rows, columns = np.nonzero(_has_free_cell(fields.grid.seen_free, stride))
-    spans = _spans(rows.astype(np.int32), columns.astype(np.int32))
-    best = np.empty((-(-fields.grid.height // stride), field.columns + _CHUNK), np.int64)
-    _lowest(field.values, field.base(spans[0], spans[1]), spans, offsets, best)
-    word = best[rows, columns]
-    tried = np.column_stack(
-        [
-            columns * stride + stride / 2,
-            rows * stride + stride / 2,
-            (word % headings) * (FULL_TURN / headings),
-        ]
-    )
-    return tried, word // headings
-
-
-def _pointscore_field(fields: MapFields, stride: int, longest_cells: float) -> PhasedField:
-    # A layout is dear to make: the scans of a sensor share the one that its longest beam asked for.
-    kept = fields.layouts.get(stride)
-    if kept is None or kept.margin * stride <= longest_cells + stride:
-        margin = 64
-        while margin * stride <= longest_cells + stride:
-            margin *= 2
-        around = _continued(fields.pointscore, margin * stride)
-        if around.max() > _SUMMED_NARROW:
-            around = around.astype(np.uint32)
-        kept = fields.layouts[stride] = lay_out(around, 1, stride, margin)
-    return kept
 
 
 def _continued(pointscore: NDArray[np.uint16], margin: int) -> NDArray[np.uint16]:

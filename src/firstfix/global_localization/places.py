@@ -8,11 +8,20 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from firstfix.core.angles import FULL_TURN
+from firstfix.core.angles import FULL_TURN, angle_error
+from firstfix.core.se2 import SE2
 
-# Nearer than this in position and heading, two poses are one place.
-SEPARATION_M = 0.5
-SEPARATION_RAD = math.radians(20.0)
+SAME_PLACE_M = 0.5
+"""Two poses are one place up to this distance, m, and `SAME_PLACE_RAD`."""
+
+SAME_PLACE_RAD = math.radians(20.0)
+"""Two poses are one place up to this difference of heading, rad, and `SAME_PLACE_M`."""
+
+
+def is_same_place(a: SE2, b: SE2) -> bool:
+    """Return whether two poses of the base are one place."""
+    near = a.distance_to(b) <= SAME_PLACE_M
+    return near and bool(angle_error(a.yaw, b.yaw) <= SAME_PLACE_RAD)
 
 
 def distinct_places(
@@ -40,7 +49,7 @@ def distinct_places(
         Indices of the chosen poses.
     """
     order = np.argsort(scores, kind="stable")
-    return _suppress(poses, order, SEPARATION_M / resolution, SEPARATION_RAD, most)
+    return _suppress(poses, order, SAME_PLACE_M / resolution, SAME_PLACE_RAD, most)
 
 
 @njit(cache=True, nogil=True)

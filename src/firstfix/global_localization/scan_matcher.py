@@ -14,10 +14,10 @@ from firstfix.core.estimate import Hypothesis, LocateResult, SearchReport, Verdi
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.fields.map_fields import MapFields, build_fields
-from firstfix.global_localization import exhaustive
+from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
 from firstfix.global_localization.config import LocateConfig, Method
+from firstfix.global_localization.exhaustive import BASIC, FAST, ExhaustiveSearch
 from firstfix.global_localization.places import distinct_places
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.scoring import score_poses, search_locally
@@ -30,9 +30,9 @@ from firstfix.global_localization.verify import Verification, verified_place, ve
 FIRST_LOOK_BEAMS = 60
 SECOND_LOOK_PLACES = 48
 
-# So many places are listed however unlikely, and all that are a hundredth as likely as the best.
+# This many places are listed however unlikely, and all that are a hundredth as likely as the best.
 LISTED_PLACES = 10
-RIVAL_SHARE = 0.01
+_LISTED_SHARE = 0.01
 
 
 class ScanMatcher:
@@ -69,11 +69,15 @@ class ScanMatcher:
         check_searchable(as_instance(OccupancyGrid, grid, "grid"))
         self.method = as_member(Method, method, "method")
         self.config = as_instance(LocateConfig, config or LocateConfig(), "config")
-        self.fields = build_fields(grid, cache_dir)
+        self.fields = MapFields(grid, cache_dir)
+        self._exhaustive: ExhaustiveSearch | None = None
         if self.method is Method.FAST:
             check_positions(self.fields)
+            self.fields.compute("endpoints", "ranges")
         else:
-            _ = self.fields.pointscore  # part of the preparation, not of the first scan
+            poses = FAST if self.method is Method.PAPER else BASIC
+            self._exhaustive = ExhaustiveSearch(self.fields, poses)
+            self.fields.compute("pointscore", "squares", "clearance")
 
     def locate(self, scan: LaserScan) -> LocateResult:
         """Find where in the map a scan was taken.
@@ -89,10 +93,9 @@ class ScanMatcher:
             Verdict and ranked hypotheses for ``T_map_base``.
         """
         as_instance(LaserScan, scan, "scan")
-        if self.method is Method.FAST:
-            return locate(scan, self.fields, self.config)
-        poses = exhaustive.FAST if self.method is Method.PAPER else exhaustive.BASIC
-        return exhaustive.locate(scan, self.fields, poses)
+        if self._exhaustive is not None:
+            return self._exhaustive.locate(scan)
+        return locate(scan, self.fields, self.config)
 
     def score_poses(self, scan: LaserScan, poses: Sequence[SE2]) -> tuple[Hypothesis, ...]:
         """Tell how well a scan fits each of some poses: `firstfix.global_localization.scoring`.
@@ -155,7 +158,7 @@ def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateRe
     if hits < FEWEST_HITS:
         return nothing_to_match(scan, hits, FEWEST_HITS, time.perf_counter() - started)
 
-    candidates, report = search(beams, fields, config.shortlist, config.budget_s)
+    candidates, report = search(beams, fields, config.shortlist, config.max_poses)
     poses = refine_on_field(candidates.poses, beams, fields)
     first_look = verify(poses, beams.thinned(FIRST_LOOK_BEAMS), fields)
     poses = poses[distinct_places(poses, first_look.scores, resolution, SECOND_LOOK_PLACES)]
@@ -194,8 +197,9 @@ def worth_listing(scores: NDArray[np.float64], beams: int) -> int:
         `LISTED_PLACES`, or more if more are a hundredth as likely as the best.
     """
     probabilities = place_probabilities(scores, beams)
-    rivals = int(np.count_nonzero(probabilities >= RIVAL_SHARE * probabilities[0]))
-    return max(LISTED_PLACES, rivals)
+    return max(
+        LISTED_PLACES, int(np.count_nonzero(probabilities >= _LISTED_SHARE * probabilities[0]))
+    )
 
 
 def _judge(
@@ -211,5 +215,5 @@ def _judge(
     if report.proven:
         return verdict, reason
     # What was not searched may hold a better place: never sure of a place then.
-    unseen = f"; the time budget left {1.0 - report.searched:.0%} of the map unsearched"
+    unseen = f"; max_poses left {1.0 - report.searched:.0%} of the map unsearched"
     return (Verdict.AMBIGUOUS if verdict is Verdict.UNIQUE else verdict), reason + unseen

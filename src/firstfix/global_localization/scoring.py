@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.angles import wrap
 from firstfix.core.estimate import Hypothesis
+from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
@@ -18,8 +20,10 @@ from firstfix.global_localization.frames import to_cells
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.verdict import place_probabilities
 from firstfix.global_localization.verify import (
+    BEAMS,
+    BeamClass,
     Verification,
-    classes_of_beams,
+    beam_classes,
     verified_place,
     verify,
 )
@@ -35,6 +39,10 @@ _NEAR_RAD = math.radians(40.0)
 _NEAR_STEP_RAD = math.radians(10.0)
 _FIRST_LOOK_BEAMS = 60
 _SECOND_LOOK = 8
+
+# A map may be cropped so tightly that a door's far side lies outside; farther out, beams meet
+# nothing that is mapped, and their low cost is no evidence for the pose.
+_OUTSIDE_M = 1.0
 
 
 def score_poses(scan: LaserScan, poses: Sequence[SE2], fields: MapFields) -> tuple[Hypothesis, ...]:
@@ -66,7 +74,9 @@ def score_poses(scan: LaserScan, poses: Sequence[SE2], fields: MapFields) -> tup
         verification.scores[:n] < verification.scores[n:], np.arange(n), np.arange(n) + n
     )
     return tuple(
-        verified_place(fields.grid, scan, verification, i, unsaid, _alone(verification, i, beams))
+        verified_place(
+            fields.grid, scan, verification, i, unsaid, _alone(verification, i, beams, fields.grid)
+        )
         for i in better.tolist()
     )
 
@@ -98,34 +108,71 @@ def search_locally(scan: LaserScan, T_map_base: SE2, fields: MapFields) -> Hypot
     on_rays, covariances = refine_on_rays(best, beams, fields)
     verification = verify(np.concatenate([on_rays, best]), beams, fields)
     i = int(np.argmin(verification.scores))
-    probability = _alone(verification, i, beams)
+    probability = _alone(verification, i, beams, fields.grid)
     return verified_place(fields.grid, scan, verification, i, covariances[0], probability)
 
 
-def classify_beams(scan: LaserScan, T_map_base: SE2, fields: MapFields) -> NDArray[np.uint8]:
-    """Tell of each beam what the map says to it at a pose.
+@dataclass(frozen=True, eq=False)
+class ClassifiedBeams:
+    """The beams of a scan that are compared with the map at a pose, and how each agrees.
+
+    The shares of these classes are the `firstfix.core.estimate.Evidence` of a hypothesis there.
+
+    Parameters
+    ----------
+    ends : ndarray, shape (n, 2)
+        Where the beams end in the map frame, m; a beam without a return ends at its range limit.
+    hit : ndarray of bool, shape (n,)
+        True where a surface returned the beam.
+    classes : ndarray of uint8, shape (n,)
+        Values of `firstfix.global_localization.verify.BeamClass`.
+    """
+
+    ends: NDArray[np.float64]
+    hit: NDArray[np.bool_]
+    classes: NDArray[np.uint8]
+
+    def share(self, kind: BeamClass) -> float:
+        """Share of the beams in a class, 0 to 1."""
+        return float(np.count_nonzero(self.classes == kind) / max(1, len(self.classes)))
+
+
+def classify_beams(scan: LaserScan, T_map_base: SE2, fields: MapFields) -> ClassifiedBeams:
+    """Classify the beams of a scan at a pose.
 
     Parameters
     ----------
     scan : LaserScan
         The scan, with the sensor's pose on the robot.
     T_map_base : SE2
-        Where the robot is taken to be.
+        Pose of the robot.
     fields : MapFields
         The prepared map.
 
     Returns
     -------
-    ndarray of uint8
-        For the beams of `usable_beams`, in their order: what
-        `firstfix.global_localization.verify.classes_of_beams` returns.
+    ClassifiedBeams
+        At most `firstfix.global_localization.verify.BEAMS` beams.
     """
-    pose = to_cells(fields.grid, scan, T_map_base)
-    return classes_of_beams(pose, usable_beams(scan), fields)
+    beams = usable_beams(scan).thinned(BEAMS)
+    T_map_laser = T_map_base @ scan.T_base_laser
+    directions = T_map_laser.yaw + beams.bearings
+    ends = np.column_stack(
+        [
+            T_map_laser.x + beams.ranges * np.cos(directions),
+            T_map_laser.y + beams.ranges * np.sin(directions),
+        ]
+    )
+    classes = beam_classes(to_cells(fields.grid, scan, T_map_base), beams, fields)
+    return ClassifiedBeams(ends, beams.hit, classes)
 
 
-def _alone(verification: Verification, i: int, beams: Beams) -> float:
+def _alone(verification: Verification, i: int, beams: Beams, grid: OccupancyGrid) -> float:
     """Return the probability of a place against a wrong map, as if there were no other."""
+    beyond = _OUTSIDE_M / grid.resolution
+    x, y, _ = verification.poses[i]
+    if not (-beyond <= x <= grid.width + beyond and -beyond <= y <= grid.height + beyond):
+        return 0.0
     return float(place_probabilities(verification.scores[[i]], len(beams))[0])
 
 

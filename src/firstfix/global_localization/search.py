@@ -13,7 +13,6 @@ everything takes milliseconds, and the optimum over the grid is proven by having
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,9 +41,6 @@ SECTORS = 8
 
 # Two by two positions and one sector are one place of the shortlist.
 _BIN = 2
-
-# Tiles between two looks at the clock: well under 10 ms.
-_CHUNK = 16
 
 # Scores are integers of this many metres, so that a score and its heading fit one 32-bit word and
 # the smaller word is the better pose. A score is at most 1.5 m: 24 bits.
@@ -83,7 +79,7 @@ class _Queries:
 
 
 def search(
-    beams: Beams, fields: MapFields, shortlist: int, budget_s: float
+    beams: Beams, fields: MapFields, shortlist: int, max_poses: int
 ) -> tuple[Candidates, SearchReport]:
     """Score all poses of the search grid and keep the best places.
 
@@ -95,8 +91,8 @@ def search(
         The prepared map.
     shortlist : int
         Number of places to keep.
-    budget_s : float
-        Wall time after which the search stops, s.
+    max_poses : int
+        Most poses to score; at least one tile is always searched.
 
     Returns
     -------
@@ -109,12 +105,10 @@ def search(
     best = np.full((len(positions), SECTORS), _UNSEEN, np.int32)
     queries = _queries(beams, fields)
     order = _spread(len(positions.tile_rows))
-    started, done = time.perf_counter(), 0
-    while done < len(order) and (done == 0 or time.perf_counter() - started < budget_s):
-        _score_tiles(order[done : done + _CHUNK], fields, queries, best)
-        done += len(order[done : done + _CHUNK])
-    sizes = np.diff(positions.tile_starts)
-    seen = int(sizes[order[:done]].sum())
+    sizes = np.diff(positions.tile_starts)[order]
+    tiles = max(1, int(np.count_nonzero(np.cumsum(sizes) * DIRECTIONS <= max_poses)))
+    _score_tiles(order[:tiles], fields, queries, best)
+    seen = int(sizes[:tiles].sum())
     report = SearchReport(
         poses=len(positions) * DIRECTIONS,
         searched=seen / max(1, len(positions)),

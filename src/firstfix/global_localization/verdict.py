@@ -104,11 +104,11 @@ def judge(
     rivals = count_rivals(probabilities)
     doubt = "; perhaps the wrong map" if best.explained < _DOUBTFUL_FIT else ""
     if rivals > 1:
-        reason = f"{rivals} places fit about as well; motion would tell them apart{doubt}"
+        reason = f"{rivals} places fit about equally well{doubt}"
     elif nowhere > 1.0 - unique_probability:
-        reason = f"{fit} here, too few to be sure{doubt}"
+        reason = f"{fit} at the best place, too few to be sure{doubt}"
     else:
-        reason = f"{fit} here, but others not badly enough to be sure{doubt}"
+        reason = f"{fit} at the best place; other places fit worse but are not excluded{doubt}"
     return Verdict.AMBIGUOUS, reason
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from numba import njit
@@ -18,6 +19,7 @@ from firstfix.global_localization.beams import Beams
 from firstfix.global_localization.frames import to_map
 
 BEAMS = 180
+"""Most beams of a scan that are compared, evenly chosen."""
 
 # Where an end point lies around a wall: 0.1 m of map and pose error, and a few beams anywhere.
 _SIGMA_M = 0.1
@@ -37,7 +39,30 @@ _NO_RETURN_WEIGHT = 0.5
 # An end point this near to a wall is explained by it.
 _EXPLAINED_M = 0.2
 
-EXPLAINED, SHORT, THROUGH, UNKNOWN = range(4)
+
+class BeamClass(IntEnum):
+    """How a beam agrees with the map: the shares of `Evidence`, in their order."""
+
+    EXPLAINED = 0
+    SHORT = 1
+    THROUGH_WALL = 2
+    UNKNOWN = 3
+
+    @property
+    def label(self) -> str:
+        """The words for people."""
+        return _LABELS[self]
+
+
+_LABELS = (
+    "explained by the map",
+    "short of a wall: people, furniture",
+    "through a wall",
+    "in unknown space",
+)
+
+# As kernels take them.
+_EXPLAINED, _SHORT, _THROUGH, _UNKNOWN = (int(kind) for kind in BeamClass)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +149,8 @@ def verified_place(
     )
 
 
-def classes_of_beams(
-    pose: NDArray[np.float64], beams: Beams, fields: MapFields
-) -> NDArray[np.uint8]:
-    """Sort the beams of a scan, all of them, by what the map says to them at one pose.
+def beam_classes(pose: NDArray[np.float64], beams: Beams, fields: MapFields) -> NDArray[np.uint8]:
+    """Classify each beam of a scan at one pose.
 
     Parameters
     ----------
@@ -141,7 +164,7 @@ def classes_of_beams(
     Returns
     -------
     ndarray of uint8, shape (len(beams),)
-        `EXPLAINED`, `SHORT`, `THROUGH` or `UNKNOWN`.
+        Values of `BeamClass`.
     """
     _, _, classes = _compared(pose[None], beams, fields)
     return classes.reshape(-1)
@@ -202,8 +225,8 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
         if 0 <= column < width and 0 <= row < height and clearance[row, column] == 0:
             # No sensor sees from within a wall, though all that is very near would fit there.
             scores[k] = _INSIDE_WALL_COST
-            counts[k, THROUGH] = ranges.shape[0]
-            classes[k] = THROUGH
+            counts[k, _THROUGH] = ranges.shape[0]
+            classes[k] = _THROUGH
             continue
         for i in range(ranges.shape[0]):
             dx = cos * cosines[i] - sin * sines[i]
@@ -219,7 +242,7 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
                 differs += _THROUGH_COST
             if not hit[i]:
                 cost += weights[i] * differs
-                classes[k, i] = THROUGH if through else EXPLAINED
+                classes[k, i] = _THROUGH if through else _EXPLAINED
                 counts[k, classes[k, i]] += 1
                 continue
             x = math.floor(poses[k, 0] + ranges[i] / resolution * dx)
@@ -229,12 +252,12 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
             near = math.exp(-0.5 * (distance / _SIGMA_M) ** 2)
             cost += weights[i] * (differs - math.log(_INLIER * near + _OUTLIER))
             if through:
-                classes[k, i] = THROUGH
+                classes[k, i] = _THROUGH
             elif distance <= _EXPLAINED_M:
-                classes[k, i] = EXPLAINED
+                classes[k, i] = _EXPLAINED
             elif not inside or unknown[y, x]:
-                classes[k, i] = UNKNOWN
+                classes[k, i] = _UNKNOWN
             else:
-                classes[k, i] = SHORT
+                classes[k, i] = _SHORT
             counts[k, classes[k, i]] += 1
         scores[k] = cost

@@ -12,8 +12,10 @@ from firstfix.core.estimate import Hypothesis, LocateResult
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.scoring import classify_beams
+from firstfix.global_localization.verify import BeamClass
 from firstfix.plots.figure import BLUE, GREEN, ORANGE, PURPLE, RED, new_figure, save_figure
-from firstfix.plots.fit import Fit, fit_of_hits
 from firstfix.plots.map_image import draw_map
 
 if TYPE_CHECKING:
@@ -23,11 +25,11 @@ ROBOT_M = 0.2
 LEAST_VIEW_M = 4.0
 LEAST_LABELLED = 0.005  # what would read "0 %" hides what matters
 
-FIT_STYLES = {
-    Fit.AS_MAPPED: (GREEN, "as mapped"),
-    Fit.SHORTER: (ORANGE, "before the wall: not in the map"),
-    Fit.THROUGH_WALL: (RED, "through a wall"),
-    Fit.UNMAPPED: (PURPLE, "where nothing is mapped"),
+BEAM_COLOURS = {
+    BeamClass.EXPLAINED: GREEN,
+    BeamClass.SHORT: ORANGE,
+    BeamClass.THROUGH_WALL: RED,
+    BeamClass.UNKNOWN: PURPLE,
 }
 
 
@@ -85,14 +87,13 @@ def draw_answer(
 
 
 def _draw_scan(axes: Axes, grid: OccupancyGrid, scan: LaserScan, T_map_base: SE2) -> None:
-    points, fits = T_map_base.apply(scan.points()), fit_of_hits(grid, scan, T_map_base)
-    for fit, (colour, words) in FIT_STYLES.items():
-        chosen = points[fits == fit]
-        if len(chosen):
-            share = f"{100 * len(chosen) / len(points):.0f} %"
-            axes.scatter(
-                chosen[:, 0], chosen[:, 1], s=9, color=colour, label=f"{share} {words}", zorder=4
-            )
+    """Draw the beams that hit; the shares of the legend count those without a return, too."""
+    beams = classify_beams(scan, T_map_base, MapFields(grid))
+    for kind, colour in BEAM_COLOURS.items():
+        x, y = beams.ends[beams.hit & (beams.classes == kind)].T
+        if beams.share(kind) > 0.0:
+            label = f"{100 * beams.share(kind):.0f} % {kind.label}"
+            axes.scatter(x, y, s=9, color=colour, label=label, zorder=4)
 
 
 def _draw_hypothesis(axes: Axes, rank: int, hypothesis: Hypothesis) -> None:

@@ -7,7 +7,6 @@ import struct
 import numpy as np
 
 from firstfix.core.se2 import SE2
-from firstfix.global_localization.beams import usable_beams
 from firstfix.global_localization.scoring import classify_beams
 from firstfix.web.snapshot import ActiveMap, ParticleCloud, RegisteredScan
 
@@ -35,17 +34,10 @@ def scan_frame(placed: RegisteredScan | None, on: ActiveMap | None) -> bytes:
     """
     if placed is None or on is None:
         return _HEADER.pack(SCAN, VERSION, 0, 0, 0.0)
-    scan = placed.scan
-    beams = usable_beams(scan)
-    classes = classify_beams(scan, placed.T_map_base, on.matcher.fields)
-    classes[~beams.hit] = NO_RETURN
-    T_map_laser = placed.T_map_base @ scan.T_base_laser
-    directions = T_map_laser.yaw + beams.bearings
-    points = np.empty((len(beams), 2), "<f4")
-    points[:, 0] = T_map_laser.x + beams.ranges * np.cos(directions)
-    points[:, 1] = T_map_laser.y + beams.ranges * np.sin(directions)
-    header = _HEADER.pack(SCAN, VERSION, 0, len(beams), scan.stamp)
-    return header + points.tobytes() + classes.tobytes()
+    beams = classify_beams(placed.scan, placed.T_map_base, on.matcher.fields)
+    classes = np.where(beams.hit, beams.classes, np.uint8(NO_RETURN))
+    header = _HEADER.pack(SCAN, VERSION, 0, len(classes), placed.scan.stamp)
+    return header + beams.ends.astype("<f4").tobytes() + classes.tobytes()
 
 
 def particles_frame(belief: ParticleCloud | None, pose: SE2 | None, stamp: float) -> bytes:

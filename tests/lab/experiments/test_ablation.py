@@ -10,7 +10,7 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.recording import Recording
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.fields.map_fields import MapFields, build_fields
+from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.config import LocateConfig
 from firstfix.global_localization.scan_matcher import locate
 from firstfix.lab.experiments.ablation import (
@@ -32,7 +32,7 @@ POSES = [SE2(3.0, 2.0, 0.5), SE2(7.5, 5.0, -2.0), SE2(4.5, 4.0, 3.0)]
 
 @pytest.fixture(scope="module")
 def fields(hall_plan: OccupancyGrid) -> MapFields:
-    return build_fields(hall_plan, None)
+    return MapFields(hall_plan)
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def test_without_nothing_it_is_the_default_method(
     fields: MapFields, scans: list[LaserScan]
 ) -> None:
     whole = AblatedMatcher(fields, Without.NOTHING)
-    alike = build_fields(identical_rooms(2), None)
+    alike = MapFields(identical_rooms(2))
     lidar = Lidar(beams=90)
     twin = lidar.scan(alike.grid, SE2(2.0, 2.0, 1.0), np.random.default_rng(1))
     blind = LaserScan(np.full(90, np.inf), 0.0, 0.07, 0.1, 12.0)
@@ -82,7 +82,7 @@ def test_a_search_without_a_score_finds_other_places(
 
 @pytest.mark.parametrize("without", [Without.COST, Without.LAW])
 def test_without_a_verdict_the_first_is_published(without: Without) -> None:
-    fields = build_fields(identical_rooms(2), None)
+    fields = MapFields(identical_rooms(2))
     scan = Lidar(beams=90).scan(fields.grid, SE2(2.0, 2.0, 1.0), np.random.default_rng(0))
     result = AblatedMatcher(fields, without).locate(scan)
     assert result.verdict is Verdict.UNIQUE

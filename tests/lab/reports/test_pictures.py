@@ -24,7 +24,6 @@ from firstfix.lab.reports.map_picture import draw_grid
 from firstfix.lab.reports.report import write_report
 from firstfix.plots.answer_picture import draw_answer
 from firstfix.plots.figure import new_figure
-from firstfix.plots.fit import Fit, fit_of_hits
 from firstfix.plots.map_image import GREY_FREE, GREY_UNKNOWN, GREY_WALL, draw_map, greys
 
 
@@ -51,7 +50,6 @@ def test_a_scan_without_a_hit_is_a_picture_too(
 ) -> None:
     blind = LaserScan(np.full(4, np.inf), 0.0, 0.1, 0.1, 10.0)
     draw_answer(hall, blind, answer(middle), tmp_path / "blind.png")
-    assert len(fit_of_hits(hall, blind, middle)) == 0
 
 
 @pytest.mark.parametrize("name", ["place.jpeg", "place", "place.txt"])
@@ -89,16 +87,6 @@ def test_a_large_map_is_shown_small_and_keeps_its_walls() -> None:
     assert small[1, 4] == GREY_WALL
     assert small[0, 0] == GREY_UNKNOWN
     assert small[2, 5] == GREY_FREE
-
-
-def test_beams_are_sorted_by_how_they_agree(hall: OccupancyGrid, middle: SE2) -> None:
-    cells = hall.cells.copy()
-    cells[:, 80:90] = -1
-    cells[:, 90:] = 0  # the wall in the east is gone
-    grid = OccupancyGrid(cells, 0.1)
-    scan = LaserScan(np.array([2.0, 3.5, 4.0, 4.9]), -np.pi / 2, np.pi / 2, 0.1, 10.0)
-    expected = [Fit.SHORTER, Fit.UNMAPPED, Fit.THROUGH_WALL, Fit.AS_MAPPED]
-    assert fit_of_hits(grid, scan, middle).tolist() == expected
 
 
 @pytest.mark.slow

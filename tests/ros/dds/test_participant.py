@@ -16,6 +16,7 @@ from cyclonedds.topic import Topic as DdsTopic
 from dds_lab import pose_of, wait_for
 
 from firstfix.cli.app import run
+from firstfix.core.angles import angle_error
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.io.ros_messages.incoming import to_seconds
@@ -31,12 +32,12 @@ def states(ear):
     return [value.value for m in ear.heard for value in m.status[0].values if value.key == "state"]
 
 
-def off_by(truth, pose):
-    """Return how far a pose is off, m and rad, from the nearest true one."""
+def assert_near(truth, pose, metres, radians):
+    """Compare a pose with the nearest true one, in position and in heading."""
     position = np.hypot(truth[:, 1] - pose[0], truth[:, 2] - pose[1])
-    turn = np.abs(np.angle(np.exp(1j * (truth[:, 3] - pose[2]))))
     nearest = int(np.argmin(position))
-    return position[nearest], turn[nearest]
+    assert position[nearest] < metres
+    assert angle_error(truth[nearest, 3], pose[2]) < radians
 
 
 @pytest.mark.slow
@@ -46,7 +47,7 @@ def test_a_robot_at_rest_is_found_and_its_pose_handed_over_once(dds):
     node = dds.node()
     found = wait_for(lambda: poses.heard)[0]
     assert found.header.frame_id == "map"
-    assert off_by(dds.truth(), pose_of(found)) < (0.1, 0.05)
+    assert_near(dds.truth(), pose_of(found), 0.1, 0.05)
 
     graph = dds.ear_named(GRAPH.name, GRAPH.type_name).latched()
     (entry,) = graph.node_entities_info_seq
@@ -58,7 +59,7 @@ def test_a_robot_at_rest_is_found_and_its_pose_handed_over_once(dds):
     assert len(poses.heard) == 1
     late = dds.ear("/initialpose", POSE)
     wait_for(lambda: late.heard)
-    assert off_by(dds.truth(), pose_of(late.heard[0])) < (0.1, 0.05)
+    assert_near(dds.truth(), pose_of(late.heard[0]), 0.1, 0.05)
 
     assert node.end(signal.SIGINT) == 0
     assert "WARN" not in node.log
@@ -95,7 +96,7 @@ def test_a_carried_robot_is_found_again_on_a_map_that_came_late(dds):
     wait_for(lambda: states(status)[-1] == "LOCALIZED")
     count = len(poses.heard)
     wait_for(lambda: len(poses.heard) > count + 5)
-    assert off_by(dds.truth()[-20:], pose_of(poses.heard[-1])) < (0.15, 0.1)
+    assert_near(dds.truth()[-20:], pose_of(poses.heard[-1]), 0.15, 0.1)
 
 
 @pytest.mark.slow
@@ -143,7 +144,7 @@ def test_nonsense_on_the_wire_does_not_end_the_node(dds):
     poses = dds.ear("/initialpose", POSE)
     dds.robot("stand")
     wait_for(lambda: poses.heard)
-    assert off_by(dds.truth(), pose_of(poses.heard[-1])) < (0.1, 0.05)
+    assert_near(dds.truth(), pose_of(poses.heard[-1]), 0.1, 0.05)
     assert "deserialization" in node.log  # Cyclone DDS says so; nothing of it came to Python
     assert "Traceback" not in node.log
 
@@ -180,7 +181,7 @@ def test_robots_in_namespaces_do_not_hear_each_other(dds):
     for name, ear in ears.items():
         wait_for(lambda ear=ear: ear.heard)
         first = ear.heard[0]
-        assert off_by(dds.truth(f"{name}.jsonl"), pose_of(first)) < (0.1, 0.05)
+        assert_near(dds.truth(f"{name}.jsonl"), pose_of(first), 0.1, 0.05)
     graphs = dds.ear_named(GRAPH.name, GRAPH.type_name)
     wait_for(lambda: len(graphs.heard) == 2)
     places = {m.node_entities_info_seq[0].node_namespace for m in graphs.heard}

@@ -22,7 +22,7 @@ from firstfix.core.estimate import LocateResult, Verdict
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.fields.map_fields import MapFields, build_fields
+from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS, Beams, usable_beams
 from firstfix.global_localization.config import LocateConfig
 from firstfix.global_localization.places import distinct_places
@@ -94,10 +94,10 @@ class AblatedMatcher:
         # A field that is the same everywhere says nothing about where the robot is.
         self._searched = fields
         if without is Without.EXPECTED_RANGES:
-            self._searched = replace(fields, ranges=_silent(fields.ranges))
+            self._searched = _altered(fields, ranges=_silent(fields.ranges))
         elif without is Without.END_POINTS:
             silent = replace(fields.endpoints, values=_silent(fields.endpoints.values))
-            self._searched = replace(fields, endpoints=silent)
+            self._searched = _altered(fields, endpoints=silent)
 
     def locate(self, scan: LaserScan) -> LocateResult:
         """Find where in the map a scan was taken, as `ScanMatcher.locate` does."""
@@ -106,7 +106,7 @@ class AblatedMatcher:
         hits = int(np.count_nonzero(beams.hit))
         if hits < FEWEST_HITS:
             return nothing_to_match(scan, hits, FEWEST_HITS, time.perf_counter() - started)
-        found, report = search(beams, self._searched, config.shortlist, config.budget_s)
+        found, report = search(beams, self._searched, config.shortlist, config.max_poses)
         poses, covariances = self._sharpened(self._best_places(found, beams, config), beams)
         verification = verify(poses, beams, fields)
         ranked = np.arange(len(poses))
@@ -183,7 +183,7 @@ class AblationTask:
     def __call__(self) -> tuple[AblationRun, ...]:
         """Run in this process."""
         room = small_room()
-        AblatedMatcher(build_fields(room, None), Without.NOTHING).locate(
+        AblatedMatcher(MapFields(room), Without.NOTHING).locate(
             scan_of(room, SE2(3.0, 2.5, 0.4))  # compiles all kernels
         )
         return ablate_case(self.case, self.case.grid(), self.limit)
@@ -206,7 +206,7 @@ def ablate_case(case: Case, grid: OccupancyGrid, limit: int) -> tuple[AblationRu
     tuple of AblationRun
         One for each member of `Without`.
     """
-    recording, fields = case.recording(), build_fields(grid, None)
+    recording, fields = case.recording(), MapFields(grid)
     truth = known_truth(case, recording)
     tried = evenly_spaced(np.flatnonzero(np.isfinite(truth).all(axis=1)), limit).tolist()
     runs = []
@@ -249,6 +249,13 @@ def ablation_table(document: Row) -> str:
 def _row(kind: str, without: Without, runs: Sequence[AblationRun]) -> dict[str, Any]:
     figures = asdict(total([summarize(run.outcomes) for run in runs]))
     return {"without": without.value, "kind": kind, "cases": len(runs), **figures}
+
+
+def _altered(fields: MapFields, **altered: object) -> MapFields:
+    """Return the fields of a map with some replaced: a computed field lies in ``__dict__``."""
+    copied = MapFields(fields.grid)
+    vars(copied).update(vars(fields) | altered)
+    return copied
 
 
 def _silent(field: NDArray[Scalar]) -> NDArray[Scalar]:

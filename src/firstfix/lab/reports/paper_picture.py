@@ -13,11 +13,12 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.pose_error import PoseError
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.scoring import classify_beams
 from firstfix.lab.experiments.starts import Attempt, Belief, Start
 from firstfix.lab.metrics.outcome import is_found
-from firstfix.plots.answer_picture import FIT_STYLES, ROBOT_M
+from firstfix.plots.answer_picture import BEAM_COLOURS, ROBOT_M
 from firstfix.plots.figure import BLUE, GREEN, RED, SKY, new_figure, save_figure
-from firstfix.plots.fit import fit_of_hits
 from firstfix.plots.map_image import draw_map
 
 if TYPE_CHECKING:
@@ -159,11 +160,11 @@ def _draw_way(axes: Axes, poses: list[SE2 | None], colour: str, label: str, widt
 
 
 def _draw_scan(axes: Axes, grid: OccupancyGrid, scan: LaserScan, T_map_base: SE2) -> None:
-    points, fits = T_map_base.apply(scan.points()), fit_of_hits(grid, scan, T_map_base)
-    for fit, (colour, words) in FIT_STYLES.items():
-        chosen = points[fits == fit]
-        if len(chosen):
-            axes.scatter(chosen[:, 0], chosen[:, 1], s=4, color=colour, label=words, zorder=5)
+    beams = classify_beams(scan, T_map_base, MapFields(grid))
+    for kind, colour in BEAM_COLOURS.items():
+        x, y = beams.ends[beams.hit & (beams.classes == kind)].T
+        if len(x):
+            axes.scatter(x, y, s=4, color=colour, label=kind.label, zorder=5)
 
 
 def _draw_robot(axes: Axes, pose: SE2, colour: str, label: str) -> None:
