@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from firstfix.io.maps.map_server import load_map, save_map
     from firstfix.lab.scenarios.example_drive import simulate_drive
     from firstfix.lab.simulation.lidar import Lidar
-    from firstfix.localizer.config import LocalizerConfig, WatchConfig
+    from firstfix.localizer.config import LocalizerConfig, MonitorConfig
     from firstfix.localizer.inputs import NewMap, NoMotionUpdate, PoseHint, Reset
     from firstfix.localizer.localizer import Localizer
     from firstfix.localizer.outputs import (
@@ -55,6 +55,7 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "LocateResult",
     "MapError",
     "Method",
+    "MonitorConfig",
     "MotionModel",
     "MotionRequest",
     "Mounting",
@@ -77,7 +78,6 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "TrackedPose",
     "Trajectory",
     "Verdict",
-    "WatchConfig",
     "load_map",
     "load_recording",
     "load_trajectory",
@@ -107,7 +107,7 @@ _MODULES = {
     "io.maps.map_server": ("load_map", "save_map"),
     "lab.scenarios.example_drive": ("simulate_drive",),
     "lab.simulation.lidar": ("Lidar",),
-    "localizer.config": ("LocalizerConfig", "WatchConfig"),
+    "localizer.config": ("LocalizerConfig", "MonitorConfig"),
     "localizer.inputs": ("NewMap", "NoMotionUpdate", "PoseHint", "Reset"),
     "localizer.localizer": ("Localizer",),
     "localizer.outputs": ("Hypotheses", "InitialPose", "MotionRequest", "Status", "TrackedPose"),

@@ -11,10 +11,10 @@ import pytest
 from firstfix.core.estimate import Verdict
 from firstfix.core.se2 import SE2
 from firstfix.lab.simulation.lidar import Lidar
-from firstfix.localizer.config import WatchConfig
+from firstfix.localizer.config import MonitorConfig
 from firstfix.localizer.contest import Contest, Standing
 
-CONFIG = WatchConfig()
+CONFIG = MonitorConfig()
 POSE = SE2(2.5, 2.0, 0.0)
 ODOM = SE2(-50.0, 20.0, 2.0)  # of no meaning to the map
 TURN = SE2(0.0, 0.0, 0.6)

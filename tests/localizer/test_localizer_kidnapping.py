@@ -119,7 +119,7 @@ def test_a_small_slip_is_mended_without_a_search(
         searches.clear()
         towards = 1.5 * seed
         robot.pose = pose @ SE2(
-            0.5 * math.cos(towards), 0.5 * math.sin(towards), math.radians(20.0)
+            0.6 * math.cos(towards), 0.6 * math.sin(towards), math.radians(20.0)
         )
         outputs = robot.ticks(10)
         assert searches == []

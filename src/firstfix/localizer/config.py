@@ -1,4 +1,4 @@
-"""All settings of the system, one tree."""
+"""The settings of a localizer, one tree."""
 
 from __future__ import annotations
 
@@ -7,77 +7,68 @@ from dataclasses import dataclass, field
 
 from firstfix.amcl.config import AmclConfig
 from firstfix.core.arguments import as_instance
-from firstfix.core.errors import InputError
+from firstfix.core.settings import check_settings, setting
 from firstfix.global_localization.config import LocateConfig
+
+# The smallest value of settings that must be positive.
+_LEAST = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class WatchConfig:
-    """When a pose is believed, doubted and given up.
+class MonitorConfig:
+    """When a pose is accepted, doubted and given up.
 
     Costs are those of `firstfix.global_localization.verify`: at true poses of real logs 97 % are
     below 1.6, at random poses 95 % are above 2.9 (docs/decisions/0011).
 
-    Parameters
-    ----------
-    doubtful_cost : float
-        Mean cost of a beam from which on a tracked pose is doubted, nats.
-    impossible_cost : float
-        Mean cost from which on a scan contradicts the tracked pose, nats.
-    lost_after_s : float
-        Time of uninterrupted contradiction after which the pose is given up, s.
-    search_period_s : float
-        Least time between two searches of the whole map beside tracking, s.
-    confirmations : int
-        Scans in a row that must agree on another place before the track goes there.
-    agree_m, agree_rad : float
-        Up to where two poses are one place.
-    look_again_m, look_again_rad : float
-        Motion after which a further scan brings news about an ambiguous place.
-    look_again_s : float
-        Time after which a robot at rest is looked at again: people and hands go, s.
-    off_m, off_rad : float
-        Error of a track that is put right although the scan still fits.
-    won_probability : float
-        Probability that a place must have to win without a UNIQUE scan.
-    won_cost : float
-        Mean cost up to which a place may win, or a track may move to it: what is found by search
-        must fit better than what is only not contradicted.
-    won_looks : int
-        Looks that this takes at least; and looks in a row at which not even the best place fits,
-        after which all are given up.
-
     Raises
     ------
     InputError
-        If a setting is not positive.
+        If a setting is out of its range.
     """
 
-    doubtful_cost: float = 1.7
-    impossible_cost: float = 2.3
-    lost_after_s: float = 2.0
-    search_period_s: float = 0.2
-    confirmations: int = 2
-    agree_m: float = 0.5
-    agree_rad: float = math.radians(15.0)
-    look_again_m: float = 0.5
-    look_again_rad: float = math.radians(30.0)
-    look_again_s: float = 1.0
-    off_m: float = 0.15
-    off_rad: float = math.radians(5.0)
-    won_probability: float = 0.99
-    won_cost: float = 1.3
-    won_looks: int = 3
+    doubtful_cost: float = setting(
+        1.7, "mean cost of a beam above which the tracked pose is doubted, nats", _LEAST, 100.0
+    )
+    contradiction_cost: float = setting(
+        2.3, "mean cost above which a scan contradicts the tracked pose, nats", _LEAST, 100.0
+    )
+    lost_after_s: float = setting(
+        2.0, "uninterrupted contradiction after which the pose is given up, s", _LEAST, 3600.0
+    )
+    search_period_s: float = setting(
+        0.2, "least time between two searches of the whole map while tracking, s", _LEAST, 3600.0
+    )
+    confirmations: int = setting(
+        2, "consecutive scans that must agree on another place to move there", 1, 100
+    )
+    new_view_m: float = setting(
+        0.5, "distance after which a scan counts as a new view of several places, m", _LEAST, 100.0
+    )
+    new_view_rad: float = setting(
+        math.radians(30.0), "turn after which a scan counts as a new view, rad", _LEAST, math.pi
+    )
+    rest_period_s: float = setting(
+        1.0, "time between searches while a robot with several places rests, s", _LEAST, 3600.0
+    )
+    correct_m: float = setting(
+        0.15, "position error that is corrected although the scan still fits, m", _LEAST, 100.0
+    )
+    correct_rad: float = setting(
+        math.radians(5.0), "heading error that is corrected likewise, rad", _LEAST, math.pi
+    )
+    decided_probability: float = setting(
+        0.99, "least probability of one of several places to be published", 0.5, 1.0
+    )
+    decided_cost: float = setting(
+        1.3, "highest mean cost at which a place is published or moved to, nats", _LEAST, 100.0
+    )
+    decided_views: int = setting(
+        3, "least number of views to decide, and of misfits in a row to give up", 1, 100
+    )
 
     def __post_init__(self) -> None:
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if not 0 < value < math.inf:
-                raise InputError(
-                    expected=f"{name} above 0",
-                    received=f"{value}",
-                    remedy="leave it at its default if in doubt",
-                )
+        check_settings(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,18 +78,18 @@ class LocalizerConfig:
     Parameters
     ----------
     locate : LocateConfig
-        Of the static stage.
+        Global localization.
     amcl : AmclConfig
-        Of the dynamic stage.
-    watch : WatchConfig
-        Of what decides between them.
+        Pose tracking.
+    monitor : MonitorConfig
+        Verification of the pose, and the choice between several places.
     """
 
     locate: LocateConfig = field(default_factory=LocateConfig)
     amcl: AmclConfig = field(default_factory=AmclConfig)
-    watch: WatchConfig = field(default_factory=WatchConfig)
+    monitor: MonitorConfig = field(default_factory=MonitorConfig)
 
     def __post_init__(self) -> None:
         as_instance(LocateConfig, self.locate, "locate")
         as_instance(AmclConfig, self.amcl, "amcl")
-        as_instance(WatchConfig, self.watch, "watch")
+        as_instance(MonitorConfig, self.monitor, "monitor")

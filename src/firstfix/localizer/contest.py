@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from firstfix.core.estimate import Hypothesis, LocateResult, Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.global_localization.places import is_same_place
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.global_localization.verdict import RIVAL_SHARE, count_rivals, log_likelihoods
-from firstfix.localizer.config import WatchConfig
-from firstfix.localizer.relocation import moved_on, same_place
+from firstfix.localizer.agreement import is_new_view
+from firstfix.localizer.config import MonitorConfig
 
 # Two scans half a metre apart are half as good as two of different robots.
 _NEWS = 0.5
@@ -59,7 +60,7 @@ class Contest:
         Odometry at that scan.
     matcher : ScanMatcher
         The static stage.
-    config : WatchConfig
+    config : MonitorConfig
         Settings.
     ids : iterator of int
         Gives every new place its number.
@@ -70,7 +71,7 @@ class Contest:
         places: tuple[Hypothesis, ...],
         T_odom_base: SE2,
         matcher: ScanMatcher,
-        config: WatchConfig,
+        config: MonitorConfig,
         ids: Iterator[int],
     ) -> None:
         self._matcher = matcher
@@ -101,7 +102,7 @@ class Contest:
 
     def brings_news(self, T_odom_base: SE2) -> bool:
         """Tell whether the robot has moved enough for a scan to say something new."""
-        return moved_on(self._looked_at, T_odom_base, self._config)
+        return is_new_view(self._looked_at, T_odom_base, self._config)
 
     def look(self, scan: LaserScan, T_odom_base: SE2) -> Standing:
         """Weigh the places by a scan, and ask whether the whole map has a better one.
@@ -125,7 +126,7 @@ class Contest:
         self._weigh(scan, T_odom_base)
         fits = any(e.place.score <= self._config.doubtful_cost for e in self._entries)
         self._misses = 0 if fits else self._misses + 1
-        if self._misses >= self._config.won_looks:
+        if self._misses >= self._config.decided_views:
             return Standing.LOST
         result = self._matcher.locate(scan)
         if result.verdict is Verdict.UNIQUE and self._wins_outright(result.hypotheses[0]):
@@ -134,9 +135,9 @@ class Contest:
         if len(self._entries) >= _MOST_ENTRIES:
             return Standing.LOST  # the right place may be one that there was no room for
         best = self.places[0]
-        decided = best.probability >= self._config.won_probability
-        decided = decided and best.score <= self._config.won_cost
-        enough = self._looks >= self._config.won_looks
+        decided = best.probability >= self._config.decided_probability
+        decided = decided and best.score <= self._config.decided_cost
+        enough = self._looks >= self._config.decided_views
         return Standing.WON if decided and enough else Standing.OPEN
 
     def look_at_rest(self, scan: LaserScan, T_odom_base: SE2) -> Standing:
@@ -169,7 +170,7 @@ class Contest:
         """
         poses = [entry.T_map_odom @ T_odom_base for entry in self._entries]
         examined = self._matcher.score_poses(scan, poses)
-        scores = np.array([*(place.score for place in examined), self._config.won_cost])
+        scores = np.array([*(place.score for place in examined), self._config.decided_cost])
         *logs, unlisted = _NEWS * log_likelihoods(scores, examined[0].evidence.beams)
         self._log_unlisted += float(unlisted)
         weighed = [
@@ -189,7 +190,7 @@ class Contest:
 
     def _wins_outright(self, place: Hypothesis) -> bool:
         known = self._known(place)
-        if known is None or place.score > self._config.won_cost:
+        if known is None or place.score > self._config.decided_cost:
             return False
         self._entries = [replace(known, place=replace(place, id=known.place.id))]
         return True
@@ -212,7 +213,7 @@ class Contest:
     def _known(self, place: Hypothesis) -> Entry | None:
         """Return the entry that is this place, if any."""
         for entry in self._entries:
-            if same_place(entry.place.pose, place.pose, self._config):
+            if is_same_place(entry.place.pose, place.pose):
                 return entry
         return None
 
@@ -232,7 +233,7 @@ class Contest:
         found = result.hypotheses[: count_rivals(_probabilities(result.hypotheses))]
         listed = self.places[: self.rivals]
         return any(self._known(place) is None for place in found) or not all(
-            any(same_place(place.pose, other.pose, self._config) for other in result.hypotheses)
+            any(is_same_place(place.pose, other.pose) for other in result.hypotheses)
             for place in listed
         )
 

@@ -23,7 +23,9 @@ from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
+from firstfix.global_localization.places import is_same_place
 from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.localizer.agreement import AgreementCounter, is_new_view
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.contest import Contest, Standing
 from firstfix.localizer.deciding_motion import deciding_motion
@@ -37,8 +39,7 @@ from firstfix.localizer.inputs import (
 )
 from firstfix.localizer.odometry_buffer import OdometryBuffer
 from firstfix.localizer.outputs import Hypotheses, InitialPose, Output, Status, TrackedPose
-from firstfix.localizer.pose_monitor import Finding, Watch
-from firstfix.localizer.relocation import Candidates, moved_on, same_place
+from firstfix.localizer.pose_monitor import Fit, PoseMonitor
 from firstfix.localizer.states import Event, State, next_state
 
 # The covariance of the static stage is that of one scan in a perfect map; a track begins wider.
@@ -90,12 +91,12 @@ class Localizer:
         self._looked_at = 0.0
         self._hint: PoseHint | None = None
         self._lost_track: SE2 | None = None  # T_map_odom, if contradicted and not picked up since
-        self._last_word_at: SE2 | None = None
-        self._candidates = Candidates(self.config.watch)
+        self._last_agreed_at: SE2 | None = None
+        self._agreement = AgreementCounter()
         self._track: Track | None = None
         self._matcher: ScanMatcher
         self._tracker: Tracker
-        self._watch: Watch
+        self._monitor: PoseMonitor
         self._contest: Contest | None = None
         self._chosen_by: str | None = None
         self._ids = itertools.count(1)
@@ -272,7 +273,7 @@ class Localizer:
         assert contest is not None  # noqa: S101 - every way into this state begins one
         if contest.brings_news(T_odom_base) or self._update_asked:
             standing = contest.look(scan, T_odom_base)
-        elif not 0.0 <= scan.stamp - self._looked_at < self.config.watch.look_again_s:
+        elif not 0.0 <= scan.stamp - self._looked_at < self.config.monitor.rest_period_s:
             standing = contest.look_at_rest(scan, T_odom_base)
         else:
             return []
@@ -299,10 +300,10 @@ class Localizer:
         place = self._matcher.search_locally(scan, hint.T_map_base)
         result = self._matcher.locate(scan)
         best = result.best or place
-        known = same_place(place.pose, best.pose, self.config.watch)
+        known = is_same_place(place.pose, best.pose)
         elsewhere = result.verdict is Verdict.UNIQUE and not known
         as_good = place.score <= _AS_GOOD * max(best.score, _GOOD_COST)
-        if as_good and not elsewhere and place.score <= self.config.watch.doubtful_cost:
+        if as_good and not elsewhere and place.score <= self.config.monitor.doubtful_cost:
             contest = None
             if result.verdict is not Verdict.UNIQUE:
                 contest = self._contest or self._contest_of(
@@ -321,26 +322,26 @@ class Localizer:
     def _follow(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
         track = self._move(scan, T_odom_base)
         T_map_base = track.T_map_odom @ T_odom_base
-        look = self._watch.look(scan, T_odom_base, T_map_base)
-        if look.finding is Finding.ELSEWHERE:
-            if same_place(look.place.pose, T_map_base, self.config.watch):
-                return self._correct(scan, T_odom_base, look.place)
-            reason = f"found {look.place.pose.distance_to(T_map_base):.1f} m from the track"
-            return self._arrive(scan, T_odom_base, look.place, Event.RELOCALIZED, reason)
-        evidence = look.place.evidence
-        if look.finding is Finding.CONTRADICTED:
+        judged = self._monitor.judge(scan, T_odom_base, T_map_base)
+        if judged.fit is Fit.ELSEWHERE:
+            if is_same_place(judged.place.pose, T_map_base):
+                return self._correct(scan, T_odom_base, judged.place)
+            reason = f"found {judged.place.pose.distance_to(T_map_base):.1f} m from the track"
+            return self._arrive(scan, T_odom_base, judged.place, Event.RELOCALIZED, reason)
+        evidence = judged.place.evidence
+        if judged.fit is Fit.CONTRADICTED:
             reason = f"only {evidence.explained:.0%} of the beams fit here, for too long: searching"
             return [self._forget(scan.stamp, Event.CONTRADICTED, reason, evidence)]
         said = f"{evidence.explained:.0%} of the beams fit"
-        self._has_leapt &= look.finding is not Finding.FITS
+        self._has_leapt &= judged.fit is not Fit.CONSISTENT
         if self._has_leapt:
             reason = f"odometry has leapt, and only {said} since: waiting for more"
             return [self._status(scan.stamp, reason, evidence)]
         reason = {
-            Finding.FITS: said,
-            Finding.SILENT: "the sensor sees too little to tell: going on by odometry",
-        }.get(look.finding, f"doubtful: only {said}")
-        if self._contest is not None and look.finding is Finding.FITS:
+            Fit.CONSISTENT: said,
+            Fit.UNINFORMATIVE: "the sensor sees too little to tell: going on by odometry",
+        }.get(judged.fit, f"doubtful: only {said}")
+        if self._contest is not None and judged.fit is Fit.CONSISTENT:
             other = self._reconsider(scan, T_odom_base, T_map_base, self._contest)
             if other is not None:
                 reason = f"the scans fit another place than the one chosen by {self._chosen_by}"
@@ -378,7 +379,7 @@ class Localizer:
         n = self.config.amcl.max_particles
         self._has_leapt = False
         self._track = Track(start(around_pose(place.pose, covariance, n, self._rng)), T_odom_base)
-        self._watch = Watch(self._matcher, self.config.watch)
+        self._monitor = PoseMonitor(self._matcher, self.config.monitor)
         T_map_odom = place.pose @ T_odom_base.inverse()
         return TrackedPose(scan.stamp, place.pose, covariance, T_map_odom)
 
@@ -392,11 +393,11 @@ class Localizer:
             return True
         if place.pose.distance_to(self._lost_track @ T_odom_base) <= _STRAYED_M:
             return True
-        before = self._last_word_at
-        if before is not None and not moved_on(before, T_odom_base, self.config.watch):
+        before = self._last_agreed_at
+        if before is not None and not is_new_view(before, T_odom_base, self.config.monitor):
             return False
-        self._last_word_at = T_odom_base
-        return self._candidates.count(place.pose, T_odom_base) >= self.config.watch.won_looks
+        self._last_agreed_at = T_odom_base
+        return self._agreement.count(place.pose, T_odom_base) >= self.config.monitor.decided_views
 
     def _worth_searching(self, scan: LaserScan, T_odom_base: SE2) -> bool:
         """Tell whether a scan may say what the last, which fitted nowhere, did not."""
@@ -418,9 +419,9 @@ class Localizer:
     ) -> Status:
         contradicted = event is Event.CONTRADICTED and self._track is not None
         self._lost_track = self._track.T_map_odom if contradicted and self._track else None
-        self._last_word_at = None
+        self._last_agreed_at = None
         self._found_nothing_at = None
-        self._candidates.clear()
+        self._agreement.clear()
         self._track = self._hint = self._contest = self._chosen_by = None
         self._waiting.clear()
         self._fire(event)
@@ -436,7 +437,7 @@ class Localizer:
         return Status(stamp, self._state, reason, evidence, rivals, self._chosen_by)
 
     def _contest_of(self, places: Sequence[Hypothesis], T_odom_base: SE2) -> Contest:
-        return Contest(tuple(places), T_odom_base, self._matcher, self.config.watch, self._ids)
+        return Contest(tuple(places), T_odom_base, self._matcher, self.config.monitor, self._ids)
 
     def _publish_places(self, scan: LaserScan, contest: Contest, reason: str) -> list[Output]:
         places = contest.places
@@ -464,7 +465,7 @@ class Localizer:
         if standing is not Standing.WON:
             return None
         best = contest.places[0]
-        if not same_place(best.pose, T_map_base, self.config.watch):
+        if not is_same_place(best.pose, T_map_base):
             return best
         self._contest = self._chosen_by = None
         return None
@@ -488,10 +489,10 @@ class Localizer:
         T_before_now = self._track.state.estimate.pose.inverse() @ T_map_base
         # Odometry that would have brought the track here, had its frame always been the new one.
         self._track = Track(self._track.state, now.T_odom_base @ T_before_now.inverse())
-        self._watch = Watch(self._matcher, self.config.watch)
+        self._monitor = PoseMonitor(self._matcher, self.config.monitor)
         return []
 
     @staticmethod
     def _no_injection(_: LaserScan, __: int, ___: np.random.Generator) -> NDArray[np.float64]:
-        """Nothing: what augmented recovery guesses at random, the watch finds by search."""
+        """Nothing: what augmented recovery guesses at random, the monitor finds by search."""
         return np.empty((0, 3))
