@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from firstfix.fields.kernel_cache import kernel
 
 # As in AMCL: 0.5 m x 0.5 m x 10 degrees.
 BIN_M = 0.5
@@ -19,14 +20,14 @@ EMPTY = -1
 FIRST_ENTRIES = 128
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def bin_of(x: float, y: float, yaw: float) -> tuple[int, int, int]:
     """Return the bin of a pose; the heading is counted from 0 to 35."""
     turn = math.floor(yaw / BIN_RAD) % HEADINGS
     return math.floor(x / BIN_M), math.floor(y / BIN_M), turn
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def new_table(entries: int) -> NDArray[np.int64]:
     """Make an empty hash table for so many bins: a column of keys, a column of values."""
     size = 16
@@ -35,7 +36,7 @@ def new_table(entries: int) -> NDArray[np.int64]:
     return np.full((size, 2), EMPTY, np.int64)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def with_room(table: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     """Return a table of the same entries that can take one more beside so many; it may be new."""
     if 2 * (count + 1) <= table.shape[0]:
@@ -48,13 +49,13 @@ def with_room(table: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     return wider
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def key_of(x: int, y: int, turn: int) -> int:
     """Pack a bin into one number, never negative; bins 8000 km apart share one."""
     return ((x & 0x1FFFFFF) << 31) | ((y & 0x1FFFFFF) << 6) | turn
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def slot_of(table: NDArray[np.int64], key: int) -> int:
     """Return the row of the table that holds a key, or the empty one where it belongs."""
     last = table.shape[0] - 1

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.amcl.bins import (
@@ -21,6 +20,7 @@ from firstfix.amcl.bins import (
 )
 from firstfix.amcl.particles import Particles
 from firstfix.core.se2 import SE2
+from firstfix.fields.kernel_cache import kernel
 
 # A belief over a whole building falls into hundreds of clusters; the heaviest are described.
 MAX_CLUSTERS = 24
@@ -74,7 +74,7 @@ def find_clusters(particles: Particles, emphasis: NDArray[np.float64]) -> tuple[
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _label(
     x: NDArray[np.float64], y: NDArray[np.float64], yaw: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], int]:
@@ -117,13 +117,13 @@ def _label(
     return label, groups
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _join(parent: NDArray[np.int64], a: int, b: int) -> None:
     a, b = _root(parent, a), _root(parent, b)
     parent[max(a, b)] = min(a, b)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _root(parent: NDArray[np.int64], i: int) -> int:
     while parent[i] != i:
         parent[i] = parent[parent[i]]
@@ -131,7 +131,7 @@ def _root(parent: NDArray[np.int64], i: int) -> int:
     return i
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _moments(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
@@ -178,7 +178,7 @@ def _moments(
     return mass, mean, covariance
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _put(
     covariance: NDArray[np.float64],
     xx: float,
@@ -192,7 +192,7 @@ def _put(
     covariance[1, 1], covariance[1, 2], covariance[2, 2] = yy, yt, tt
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _means(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
@@ -237,6 +237,6 @@ def _means(
     return mass, mean
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _wrapped(turn: float) -> float:
     return turn - 2.0 * math.pi * math.ceil(turn / (2.0 * math.pi) - 0.5)

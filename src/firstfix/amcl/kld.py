@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.amcl.bins import (
@@ -20,6 +19,7 @@ from firstfix.amcl.bins import (
 from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.particles import Particles
 from firstfix.amcl.resampling import systematic
+from firstfix.fields.kernel_cache import kernel
 
 
 def sample_size(bins: int, config: AmclConfig) -> int:
@@ -71,7 +71,7 @@ def adapted_size(particles: Particles, config: AmclConfig, rng: np.random.Genera
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _needed(bins: int, pf_err: float, pf_z: float) -> float:
     if bins <= 1:
         return 1.0
@@ -81,7 +81,7 @@ def _needed(bins: int, pf_err: float, pf_z: float) -> float:
     return float(freedom / (2.0 * pf_err) * root * root * root)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _draws_until_enough(
     x: NDArray[np.float64],
     y: NDArray[np.float64],

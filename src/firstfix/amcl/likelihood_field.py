@@ -9,7 +9,6 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.amcl.beam_selection import SelectedBeams
@@ -17,6 +16,7 @@ from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.amcl.particles import Particles
 from firstfix.core.grid import OccupancyGrid
 from firstfix.fields.distance import MAX_LIMIT, truncated_squares
+from firstfix.fields.kernel_cache import kernel
 
 # Logarithms are summed as integers: exact, so the same in any order and on any processor, and
 # vectorised without leave to reorder floating point. 20 000 beams stay within 31 bits.
@@ -170,7 +170,7 @@ def _columns(points: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[
     return points[:, 0].astype(np.float32), points[:, 1].astype(np.float32)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sum_values(  # noqa: PLR0913 - a kernel takes its arrays one by one
     x: NDArray[np.float32],
     y: NDArray[np.float32],
@@ -201,7 +201,7 @@ def _sum_values(  # noqa: PLR0913 - a kernel takes its arrays one by one
                 total[i] += values[cells[i]]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_values(  # noqa: PLR0913 - a kernel takes its arrays one by one
     x: NDArray[np.float32],
     y: NDArray[np.float32],
@@ -226,7 +226,7 @@ def _count_values(  # noqa: PLR0913 - a kernel takes its arrays one by one
                 counts[b] += values[cells[i]]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _find_cells(
     x: NDArray[np.float32],
     y: NDArray[np.float32],

@@ -11,13 +11,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.amcl.config import AmclConfig, MotionModel
 from firstfix.amcl.particles import Particles
 from firstfix.core.angles import angle_error, wrap
 from firstfix.core.se2 import SE2
+from firstfix.fields.kernel_cache import kernel
 
 # Below this a translation has no direction worth believing: its errors are those of a robot turning
 # in place (as in ROS).
@@ -144,7 +144,7 @@ def _omnidirectional(T_before_after: SE2, config: AmclConfig) -> Motion:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _drive(
     x: NDArray[np.float64],
     y: NDArray[np.float64],

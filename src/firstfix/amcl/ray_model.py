@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.amcl.beam_selection import SelectedBeams
@@ -16,6 +15,7 @@ from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.particles import Particles
 from firstfix.core.grid import OccupancyGrid
 from firstfix.fields.clearance import chessboard_clearance
+from firstfix.fields.kernel_cache import kernel
 from firstfix.fields.raycast import cast_ray_leaping
 
 
@@ -78,7 +78,7 @@ class RayModel:
         return logs, len(beams)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _log_of_mixture(  # noqa: PLR0913 - a kernel takes its arrays one by one
     sensors: NDArray[np.float64],
     headings: NDArray[np.float64],

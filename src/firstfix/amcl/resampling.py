@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from firstfix.fields.kernel_cache import kernel
 
 
 def systematic(weight: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.int64]:
@@ -30,7 +31,7 @@ def systematic(weight: NDArray[np.float64], n: int, rng: np.random.Generator) ->
     return _comb(weight, n, rng.random())
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _comb(weight: NDArray[np.float64], n: int, offset: float) -> NDArray[np.int64]:
     drawn = np.empty(n, np.int64)
     # Rounding may leave the last teeth above the sum: they fall to the last that weighs anything.

@@ -149,7 +149,7 @@ def _tried_kernels() -> str:
     import numpy as np
 
     from firstfix.core.se2 import SE2
-    from firstfix.fields.raycast import cast_ray_leaping
+    from firstfix.fields.kernel_cache import kernel_folder
     from firstfix.global_localization.scan_matcher import ScanMatcher
     from firstfix.lab.simulation.lidar import Lidar
     from firstfix.lab.worlds.catalog import identical_rooms
@@ -163,7 +163,7 @@ def _tried_kernels() -> str:
     result = matcher.locate(scan)
     return (
         f"ready after {loaded:.2f} s; then {result.elapsed_s:.3f} s a scan ({result.verdict.value})"
-        f"; kept in {cast_ray_leaping.stats.cache_path}"
+        f"; kept in {kernel_folder()}"
     )
 
 

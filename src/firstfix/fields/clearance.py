@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from firstfix.fields.kernel_cache import kernel
 
 MAX_CLEARANCE = 255
 """Largest clearance reported, cells."""
@@ -35,7 +36,7 @@ def chessboard_clearance(occupied: NDArray[np.bool_]) -> NDArray[np.uint8]:
     return clearance
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sweep(occupied: NDArray[np.bool_], clearance: NDArray[np.uint8]) -> None:
     """Go down and up in straight and diagonal steps, then along each row.
 
@@ -67,7 +68,7 @@ def _sweep(occupied: NDArray[np.bool_], clearance: NDArray[np.uint8]) -> None:
         _look_along(row, one, other)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _nearest_of_three(before: NDArray[np.uint8], nearest: NDArray[np.uint8]) -> None:
     """Write one more than the minimum of the three neighbours in the row before, or the most."""
     n = nearest.size
@@ -77,7 +78,7 @@ def _nearest_of_three(before: NDArray[np.uint8], nearest: NDArray[np.uint8]) -> 
         nearest[c] = np.uint8(min(left[c], most, middle[c], right[c]) + one)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _look_along(
     row: NDArray[np.uint8], padded: NDArray[np.uint8], other: NDArray[np.uint8]
 ) -> None:
@@ -101,7 +102,7 @@ def _look_along(
         row[c] = inner[c]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _step_along(source: NDArray[np.uint8], target: NDArray[np.uint8], step: int) -> None:
     n = source.size - 2 * _MARGIN
     left, right = source[_MARGIN - step :], source[_MARGIN + step :]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from firstfix.fields.kernel_cache import kernel
 
 SATURATED = 65535
 
@@ -19,7 +20,7 @@ _CHUNK = 128
 # That is ten times the speed of the same sweeps written as one loop.
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def manhattan(occupied: NDArray[np.bool_], distance: NDArray[np.uint16]) -> None:
     """Write the pointscore: down, then up, right and left in each row."""
     height, width = occupied.shape
@@ -46,7 +47,7 @@ def manhattan(occupied: NDArray[np.bool_], distance: NDArray[np.uint16]) -> None
             row[c] = beside
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def euclidean(
     occupied: NDArray[np.bool_], column: NDArray[np.int32], distance: NDArray[np.float32]
 ) -> None:
@@ -73,7 +74,7 @@ def euclidean(
             out[c] = np.sqrt(squares[c])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _lower_envelope(
     near: NDArray[np.int32], sites: NDArray[np.int64], starts: NDArray[np.int64]
 ) -> int:
@@ -101,7 +102,7 @@ def _lower_envelope(
     return last + 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _squares_of_envelope(
     near: NDArray[np.int32],
     sites: NDArray[np.int64],
@@ -118,7 +119,7 @@ def _squares_of_envelope(
     squares[:end] = np.inf  # no column knows a wall: there is none
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def truncated(occupied: NDArray[np.bool_], limit: int, squares: NDArray[np.uint16]) -> None:
     """Write the squared distance, at most ``limit`` squared."""
     height, width = occupied.shape
@@ -145,7 +146,7 @@ def truncated(occupied: NDArray[np.bool_], limit: int, squares: NDArray[np.uint1
             _look_outward(padded[begin : begin + best.size + 2 * limit], limit, best)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _look_outward(window: NDArray[np.uint16], limit: int, best: NDArray[np.uint16]) -> None:
     """Compare with columns ever farther away, until none can be nearer; window = best + margins."""
     n = best.size

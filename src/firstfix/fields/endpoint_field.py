@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from firstfix.fields.kernel_cache import kernel
 from firstfix.fields.phased_field import PhasedField, lay_out
 
 UNIT_M = 0.05
@@ -52,7 +52,7 @@ def build_endpoint_field(
     return lay_out(pooled, side, phases, margin)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _pool(squares: NDArray[np.uint16], table: NDArray[np.float32], side: int) -> NDArray[np.uint8]:
     height, width = squares.shape
     pooled = np.empty((-(-height // side), -(-width // side)), np.uint8)

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.core.angles import FULL_TURN
+from firstfix.fields.kernel_cache import kernel
 from firstfix.fields.raycast import cast_ray_leaping
 from firstfix.fields.search_grid import SearchGrid
 
@@ -55,7 +55,7 @@ def build_range_table(
     return table
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fill(
     clearance: NDArray[np.uint8],
     x: NDArray[np.float64],

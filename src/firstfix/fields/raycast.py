@@ -11,11 +11,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
+from firstfix.fields.kernel_cache import kernel
 
 # Stands for 1/0 in the direction a ray does not move: times 0 it is 0 where infinity were NaN,
 # times the side of any map it is still finite.
@@ -60,7 +60,7 @@ def expected_ranges(
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def cast_rays(
     occupied: NDArray[np.bool_],
     x: float,
@@ -76,7 +76,7 @@ def cast_rays(
     return ranges
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def cast_ray(
     occupied: NDArray[np.bool_], x: float, y: float, heading: float, max_range_cells: float
 ) -> float:
@@ -124,7 +124,7 @@ def cast_ray(
     return max_range_cells
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def cast_ray_leaping(
     clearance: NDArray[np.uint8], x: float, y: float, dx: float, dy: float, max_range_cells: float
 ) -> float:
@@ -180,13 +180,13 @@ def cast_ray_leaping(
     return max_range_cells
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _is_inside_cell(along: float) -> bool:
     """Tell whether rounding cannot have put a coordinate into the wrong cell."""
     return abs(along - math.floor(along + 0.5)) > _NEAR_LINE
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _towards(d: float) -> tuple[int, int, float]:
     """Step to the next cell, grid line ahead of a cell's lower side, and length of ray per cell."""
     if abs(d) < 1.0 / _NEVER:

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.core.grid import OccupancyGrid
+from firstfix.fields.kernel_cache import kernel
 
 TILE_ROWS = 16
 TILE_COLUMNS = 64
@@ -105,7 +105,7 @@ def build_search_grid(grid: OccupancyGrid) -> SearchGrid:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _free_blocks(
     free: NDArray[np.bool_], occupied: NDArray[np.bool_], stride: int
 ) -> NDArray[np.bool_]:

@@ -13,12 +13,12 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.core.angles import FULL_TURN
 from firstfix.core.estimate import Hypothesis, LocateResult, SearchReport, Verdict
 from firstfix.core.scan import LaserScan
+from firstfix.fields.kernel_cache import kernel
 from firstfix.fields.map_fields import MapFields
 from firstfix.fields.phased_field import PhasedField, lay_out
 from firstfix.global_localization.beams import Beams, usable_beams
@@ -210,7 +210,7 @@ def _spans(rows: NDArray[np.int32], columns: NDArray[np.int32]) -> NDArray[np.in
     return np.stack([used, columns[first], columns[last] + 1]).astype(np.int32)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _lowest(
     values: NDArray[np.uint16],
     bases: NDArray[np.int64],

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.core.angles import FULL_TURN, angle_error
 from firstfix.core.se2 import SE2
+from firstfix.fields.kernel_cache import kernel
 
 SAME_PLACE_M = 0.5
 """Two poses are one place up to this distance, m, and `SAME_PLACE_RAD`."""
@@ -52,7 +52,7 @@ def distinct_places(
     return _suppress(poses, order, SAME_PLACE_M / resolution, SAME_PLACE_RAD, most)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _suppress(
     poses: NDArray[np.float64],
     order: NDArray[np.int64],

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from firstfix.fields.kernel_cache import kernel
 from firstfix.fields.map_fields import MapFields
 from firstfix.fields.raycast import cast_ray_leaping
 from firstfix.global_localization.beams import Beams
@@ -125,7 +125,7 @@ def refine_on_rays(
     return refined, covariances * _BEAMS_PER_WITNESS + _MAP_COVARIANCE
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _descend_field(
     poses: NDArray[np.float64],
     ends_x: NDArray[np.float64],
@@ -177,7 +177,7 @@ def _descend_field(
             poses[k, 2] -= max(-0.05, min(0.05, g[2]))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _solve(A: NDArray[np.float64], L: NDArray[np.float64], b: NDArray[np.float64]) -> None:
     """Solve A x = b by Cholesky's A = L L'; only the lower half of A counts, b becomes x."""
     # Numba lends NumPy's solver only where SciPy is installed, which it is not at run time.
@@ -198,7 +198,7 @@ def _solve(A: NDArray[np.float64], L: NDArray[np.float64], b: NDArray[np.float64
         b[i] /= L[i, i]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
     poses: NDArray[np.float64],
     information: NDArray[np.float64],
@@ -266,7 +266,7 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
         variances[k] = max(squared / max(weights, 1.0), 1.0 / 48.0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _normal(
     squares: NDArray[np.uint16], distances: NDArray[np.float32], x: float, y: float
 ) -> tuple[float, float]:

@@ -16,12 +16,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.core.angles import FULL_TURN
 from firstfix.core.estimate import SearchReport
 from firstfix.fields import endpoint_field, range_table
+from firstfix.fields.kernel_cache import kernel
 from firstfix.fields.map_fields import MapFields
 from firstfix.fields.range_table import DIRECTIONS
 from firstfix.fields.search_grid import TILE_COLUMNS, TILE_ROWS
@@ -205,7 +205,7 @@ def _best_places(best: NDArray[np.int32], fields: MapFields, shortlist: int) -> 
 # ranges of at most 10), slices taken outside the loops. `benchmarks/kernels` times them.
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _score(  # noqa: PLR0913 - a kernel takes its arrays one by one
     tiles: NDArray[np.int64],
     tile_starts: NDArray[np.int64],
@@ -246,7 +246,7 @@ def _score(  # noqa: PLR0913 - a kernel takes its arrays one by one
                     best[j, sector] = words[sector, columns[j]]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _choose_headings(
     ends: NDArray[np.uint16],
     gaps: NDArray[np.uint16],
@@ -269,7 +269,7 @@ def _choose_headings(
                 word[c] = min(word[c], np.int32(np.int32(score << _HEADING_BITS) | np.int32(h)))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _add_endpoints(
     counts: NDArray[np.uint8],
     base: int,
@@ -315,7 +315,7 @@ def _add_endpoints(
             i += 1
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel
 def _mismatch(
     measured: np.uint8, expected: np.uint8, through: np.uint8, short: np.uint8
 ) -> np.uint8:
@@ -323,7 +323,7 @@ def _mismatch(
     return np.uint8(min(np.uint8(far - expected), through) + min(np.uint8(far - measured), short))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _add_ranges(
     expected: NDArray[np.uint8],
     directions: NDArray[np.int64],

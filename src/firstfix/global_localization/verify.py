@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.core.estimate import Evidence, Hypothesis
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
+from firstfix.fields.kernel_cache import kernel
 from firstfix.fields.map_fields import MapFields
 from firstfix.fields.raycast import cast_ray_leaping
 from firstfix.global_localization.beams import Beams
@@ -200,7 +200,7 @@ def _compared(
     return scores, counts, classes
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
     poses: NDArray[np.float64],
     cosines: NDArray[np.float64],

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.core.angles import FULL_TURN
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.fields.kernel_cache import kernel
 from firstfix.fields.raycast import cast_ray_leaping
 from firstfix.lab.simulation.floor import Floor
 from firstfix.lab.simulation.lidar import Lidar
@@ -88,7 +88,7 @@ def _poses_of_beams(
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _cast(
     clearance: NDArray[np.uint8],
     x: NDArray[np.float64],

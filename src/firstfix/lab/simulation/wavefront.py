@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from firstfix.fields.kernel_cache import kernel
 
 _DIAGONAL = np.float32(1.4142135)
 _LENGTHS = np.array(  # of a step to each neighbour; staying is none
@@ -38,7 +39,7 @@ def walking_costs(weights: NDArray[np.float32], row: int, column: int) -> NDArra
     return costs[1:-1, 1:-1]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sweep_until_still(weights: NDArray[np.float32], costs: NDArray[np.float32]) -> None:
     height, width = weights.shape
     changed = True
@@ -54,7 +55,7 @@ def _sweep_until_still(weights: NDArray[np.float32], costs: NDArray[np.float32])
                     changed = True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _improve(
     weights: NDArray[np.float32], costs: NDArray[np.float32], r: int, c: int, before: int
 ) -> bool:

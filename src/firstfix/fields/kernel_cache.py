@@ -1,0 +1,103 @@
+"""Compiled kernels on disk, in a folder whose name is a hash of all kernel sources.
+
+Numba's cache notices changes of a kernel's own file, but not of a constant or a callee from another
+file. A folder for each state of the sources never holds stale code, also when a checkout goes back
+and forth between two states.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+from numba import njit
+
+from firstfix.fields.cache import cache_folder
+
+_SETTINGS: Any = numba.config  # set from the environment when numba was imported
+
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+
+PACKAGE = Path(__file__).parents[1]
+_FOLDERS = ("amcl", "belief", "fields", "global_localization", "lab/simulation")
+_CONSTANTS = ("core/angles.py",)
+
+_PREFIX = "kernels-"
+# Other versions may share the folder: keep what was used lately.
+_KEPT = 4
+_UNUSED_AFTER_S = 24 * 3600.0
+
+
+def kernel(function: Kernel) -> Kernel:
+    """Compile a function at its first call, without the GIL, and keep the machine code on disk.
+
+    The folder is ``NUMBA_CACHE_DIR`` if that is set, else ``__pycache__`` of the package, else the
+    user's cache folder. Numba's settings for other packages stay as they are.
+    """
+    with _cached_in(kernel_folder()):
+        compiled: Any = njit(cache=True, nogil=True)(function)
+    return cast("Kernel", compiled)
+
+
+def kernel_sources() -> list[Path]:
+    """Return the files that compiled code depends on, sorted."""
+    files = [file for folder in _FOLDERS for file in (PACKAGE / folder).glob("*.py")]
+    kernels = [file for file in files if b"\n@kernel\n" in file.read_bytes()]
+    return sorted([*kernels, *(PACKAGE / name for name in _CONSTANTS)])
+
+
+@cache
+def kernel_folder() -> Path:
+    """Return the folder of compiled kernels for the sources as they are; removes unused ones."""
+    digest = hashlib.blake2b(digest_size=8)
+    for file in kernel_sources():
+        content = file.read_bytes()
+        digest.update(f"{file.relative_to(PACKAGE).as_posix()} {len(content)}\n".encode())
+        digest.update(content)
+    name = f"{_PREFIX}{digest.hexdigest()}"
+    named = _SETTINGS.CACHE_DIR
+    for parent in (Path(named),) if named else (PACKAGE / "__pycache__", cache_folder()):
+        folder = parent / name
+        if _is_writable(folder):
+            _remove_unused(parent, folder)
+            return folder
+    return Path(named or cache_folder()) / name  # numba raises an error that names the remedy
+
+
+@contextlib.contextmanager
+def _cached_in(folder: Path) -> Iterator[None]:
+    """Let numba choose a folder for the kernels decorated meanwhile."""
+    before = _SETTINGS.CACHE_DIR
+    _SETTINGS.CACHE_DIR = str(folder)
+    try:
+        yield
+    finally:
+        _SETTINGS.CACHE_DIR = before
+
+
+def _is_writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            os.utime(folder)  # used now
+    except OSError:
+        return False
+    return True
+
+
+def _remove_unused(parent: Path, used: Path) -> None:
+    with contextlib.suppress(OSError):  # another process may remove them at the same time
+        times = {folder: folder.stat().st_mtime for folder in parent.glob(f"{_PREFIX}*")}
+        newest = sorted(times, key=lambda folder: -times[folder])
+        for folder in newest[_KEPT:]:
+            if folder != used and time.time() - times[folder] > _UNUSED_AFTER_S:
+                shutil.rmtree(folder, ignore_errors=True)
