@@ -48,11 +48,11 @@ from firstfix.io.ros_messages.incoming import (
 )
 from firstfix.io.saved_pose import SavedPose, load_pose, save_pose
 from firstfix.ros.arguments import settings_from
-from firstfix.web.commands import decode_command
+from firstfix.web.commands import ClientMessage
+from firstfix.web.json_decoding import decode
 from firstfix.web.locate_queue import LocateQueue
 from firstfix.web.request_body import JSON, NPZ
 from firstfix.web.snapshot import ActiveMap
-from firstfix.web.strict_json import parsed
 
 MAX_CELLS = 1_000_000
 _HEADER = b"image: map.%s\nresolution: 0.05\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n"
@@ -149,13 +149,13 @@ def read_node_argument(data: bytes, _: Path) -> None:
 
 def read_order(data: bytes, _: Path) -> None:
     """Read what a viewer of the live page asks for."""
-    decode_command(parsed(data))
+    decode(data, ClientMessage)
 
 
 def _search_for(kind: str) -> Target:
     def read(data: bytes, _: Path) -> None:
         with suppress(HTTPException):
-            asyncio.run(LocateQueue().answer(data, kind, None, _small_map()))
+            asyncio.run(LocateQueue().locate(data, kind, None, _small_map()))
 
     return read
 

@@ -112,7 +112,7 @@ def test_the_own_page_and_programs_may(site: Site):
 def test_a_token_opens_everything_but_the_page_which_is_open(locked: Site):
     for path in ("v1/status", "v1/map.png", "openapi.json", "v1/nothing", "anything"):
         answer = httpx.get(locked.url + path)
-        assert refused(answer, 401)["detail"] == "a token is needed"
+        assert refused(answer, 401)["detail"] == "A token is needed."
         assert answer.headers["www-authenticate"] == "Bearer"
     assert httpx.get(locked.url).status_code == 200
     assert httpx.get(locked.url + "static/index.html").status_code == 200
@@ -200,6 +200,6 @@ def test_the_url_of_all_addresses_names_the_machine():
 
 
 def test_a_right_token_is_known_whatever_its_letters():
-    assert AccessPolicy("naïve-☃-token").knows("naïve-☃-token")
-    assert not AccessPolicy("naïve-☃-token").knows("naive-☃-token")
-    assert not AccessPolicy("token").knows("token\udcff")
+    assert AccessPolicy("naïve-☃-token").accepts("naïve-☃-token")
+    assert not AccessPolicy("naïve-☃-token").accepts("naive-☃-token")
+    assert not AccessPolicy("token").accepts("token\udcff")

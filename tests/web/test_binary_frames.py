@@ -13,7 +13,6 @@ from firstfix.core.se2 import SE2
 from firstfix.global_localization.beams import usable_beams
 from firstfix.global_localization.verify import BEAMS
 from firstfix.web.binary_frames import NO_RETURN, particles_frame, scan_frame
-from firstfix.web.messages import as_text, hello_message, map_object, state_message
 from firstfix.web.snapshot import ParticleCloud, Snapshot
 
 
@@ -69,20 +68,3 @@ def test_particles_go_with_the_robot():
     # Half a metre ahead, each in its own direction.
     moved = [[1.5, 2.0, 0.1], [1.0, 2.5, np.pi / 2 + 0.1]]
     np.testing.assert_allclose(values, moved, atol=1e-6)
-
-
-def test_the_words_are_json_without_nan(view):
-    state = state_message(view, 3)
-    assert state["viewers"] == 3
-    assert state["covariance"] == pytest.approx(
-        [float(view.covariance[i]) for i in ((0, 0), (0, 1), (1, 1), (2, 2))]
-    )
-    assert as_text({"a": float("nan"), "b": [float("inf"), 1.5]}) == '{"a":null,"b":[null,1.5]}'
-    assert as_text({"a": "Gebäude\udcff"}).isascii()
-
-
-def test_hello_says_who_may_do_what(view):
-    hello = hello_message("sim", ("goal",), view.map, [], may_steer=False)
-    assert hello["map"] == map_object(view.map)
-    assert (hello["may_steer"], hello["abilities"]) == (False, ["goal"])
-    assert hello_message("dds", (), None, [], may_steer=True)["map"] is None

@@ -1,4 +1,4 @@
-"""The map as a picture: nothing that a robot could run into is lost in it."""
+"""The map as a PNG: no wall is lost in it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from PIL import Image
 
 from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.web.map_png import MOST_PIXELS, MapPngCache, image_of
+from firstfix.web.map_png import MOST_PIXELS, MapPngCache, png_layout
 from firstfix.web.snapshot import ActiveMap
 
 WALL, DARK, LIGHT = 40, 205, 255
@@ -46,13 +46,13 @@ def test_a_thin_wall_stays_in_a_small_picture():
 @pytest.mark.parametrize("side", [64, 100, 101, 127, 600])
 def test_it_is_as_large_as_it_is_said_to_be(side):
     of = shown(np.full((333, 600), FREE))
-    told = image_of(of, side)
-    assert picture(of, side).shape == (told["height"], told["width"])
-    assert max(told["width"], told["height"]) <= side
+    width, height, resolution = png_layout(of, side)
+    assert picture(of, side).shape == (height, width)
+    assert max(width, height) <= side
     # From the lower-left corner on, it covers the map, and less than a pixel more.
-    for pixels, cells in ((told["width"], 600), (told["height"], 333)):
-        beyond = pixels * told["resolution"] - cells * 0.05
-        assert -1e-9 <= beyond < told["resolution"]
+    for pixels, cells in ((width, 600), (height, 333)):
+        beyond = pixels * resolution - cells * 0.05
+        assert -1e-9 <= beyond < resolution
 
 
 def test_the_corner_of_the_picture_is_that_of_the_map():
@@ -70,7 +70,7 @@ def test_a_large_map_is_scaled_to_what_a_browser_can_draw():
     drawn = picture(of)
     assert drawn.shape == (2800, 3000)
     assert (drawn == WALL).all(axis=1).sum() == 1
-    assert image_of(of)["resolution"] == 0.1
+    assert png_layout(of)[2] == 0.1
 
 
 def test_a_picture_is_drawn_once():
@@ -78,4 +78,4 @@ def test_a_picture_is_drawn_once():
     assert pictures.png(of) is pictures.png(of)
     for side in range(64, 90):
         pictures.png(of, side)
-    assert len(pictures._drawn) <= 4
+    assert len(pictures._cached) <= 4

@@ -95,7 +95,7 @@ def test_who_may_only_watch_sees_no_action(visit: Visitor, watched: Server) -> N
     assert page.data("mode") == "look"
     page.page.keyboard.press("?")
     assert page.page.locator("#help-dialog .steer:visible").count() == 0
-    assert not [text for text in page.events() if "search anew" in text]
+    assert not [text for text in page.events() if "Relocalization requested" in text]
 
 
 def test_several_watch_at_once(visit: Visitor, watched: Server) -> None:

@@ -27,7 +27,7 @@ def page(visit: Visitor, office_server: Server) -> Visit:
 
 def said_at(page: Visit) -> tuple[float, float]:
     """Return where the newest hint says that the robot is."""
-    match = page.wait_for_event(r"says.* \((-?[\d.]+), (-?[\d.]+)\)")
+    match = page.wait_for_event(r"Hint from.* \((-?[\d.]+), (-?[\d.]+)\)")
     return float(match[1]), float(match[2])
 
 
@@ -57,7 +57,7 @@ def test_a_drag_sets_the_pose(page: Visit) -> None:
     assert math.dist(said_at(page), (x, y)) < 0.05
     assert page.data("mode") == "look"
     page.page.keyboard.press(" ")
-    page.wait_for_event("a person said where")
+    page.wait_for_event("Localized at")
     page.wait_for_state("LOCALIZED")
     assert is_near_truth(page, 0.2, 0.2)
 
@@ -68,7 +68,7 @@ def test_a_press_without_a_pull_says_nothing(page: Visit) -> None:
     page.click_on_map(20.0, 12.0)
     page.page.wait_for_selector("#complaint", state="visible")
     assert "pull" in page.page.inner_text("#complaint")
-    assert not [text for text in page.events() if "says" in text and text not in before]
+    assert not [text for text in page.events() if "Hint from" in text and text not in before]
 
 
 def test_a_long_press_of_a_finger_sets_the_pose(visit: Visitor, office_server: Server) -> None:
@@ -89,7 +89,7 @@ def test_a_long_press_of_a_finger_sets_the_pose(visit: Visitor, office_server: S
     assert math.dist(said_at(page), (x, y)) < 0.05
     page.page.wait_for_timeout(700)  # sooner, the browser takes both for a double tap
     page.page.tap("#pause")
-    page.wait_for_event("a person said where")
+    page.wait_for_event("Localized at")
     page.wait_for_state("LOCALIZED")
 
 
@@ -168,13 +168,13 @@ def test_a_carried_robot_is_searched_and_found(page: Visit) -> None:
     x, y, yaw = 4.0, 19.5, -0.8
     page.page.click("#mode-carry")
     page.press_and_pull(x, y, yaw)
-    page.wait_for_state("SEARCHING")
-    assert page.page.inner_text("#state-word") == "SEARCHING"
+    page.wait_for_state("LIFTED")
+    assert page.page.inner_text("#state-word") == "LIFTED"
     page.wait_for_state("LOCALIZED")
     wait_until(lambda: is_near_truth(page, 0.3, 0.2), lambda: f"{page.pose()}")
-    match = page.wait_for_event(r"carried to \((-?[\d.]+), (-?[\d.]+)\)")
+    match = page.wait_for_event(r"Carried to \((-?[\d.]+), (-?[\d.]+)\)")
     assert math.dist((float(match[1]), float(match[2])), (x, y)) < 0.06  # a pixel at this scale
-    page.wait_for_event("found at")
+    page.wait_for_event("Localized at")
 
 
 def test_a_goal_is_driven_to(page: Visit) -> None:
@@ -184,7 +184,7 @@ def test_a_goal_is_driven_to(page: Visit) -> None:
     goal = min(near, key=lambda place: math.dist((place.x, place.y), here[:2]))
     page.page.click("#mode-goal")
     page.click_on_map(goal.x, goal.y)
-    page.wait_for_event("sent to")
+    page.wait_for_event("Goal set")
     wait_until(
         lambda: math.dist(page.pose("truth")[:2], (goal.x, goal.y)) < 0.3,
         lambda: f"at {page.pose('truth')}, not {goal}",
@@ -204,7 +204,7 @@ def test_what_cannot_be_done_is_said(page: Visit) -> None:
 
 def test_relocalize_forgets_and_searches(page: Visit) -> None:
     page.page.click("#relocalize")
-    page.wait_for_event("search anew")
+    page.wait_for_event("Relocalization requested")
     page.wait_for_state("LOCALIZED")
 
 

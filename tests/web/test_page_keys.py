@@ -58,7 +58,7 @@ def test_keys_set_the_pose(page: Visit) -> None:
         keyboard.press("ArrowRight")
     keyboard.press("Shift+ArrowLeft")
     keyboard.press("Enter")
-    match = page.wait_for_event(r"says.* \((-?[\d.]+), (-?[\d.]+)\)")
+    match = page.wait_for_event(r"Hint from.* \((-?[\d.]+), (-?[\d.]+)\)")
     said = float(match[1]), float(match[2])
     assert math.dist(said, (x + 24.0 / scale, y)) < 0.05
     assert page.data("mode") == "look"

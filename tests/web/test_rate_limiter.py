@@ -9,27 +9,27 @@ from firstfix.web.rate_limiter import RateLimiter
 
 def test_the_end_of_an_allowance():
     now = [0.0]
-    allowance = RateLimiter(rate_hz=2.0, burst=3.0, clock=lambda: now[0])
-    assert [allowance.takes("a") for _ in range(4)] == [True, True, True, False]
-    assert allowance.takes("b")
+    limiter = RateLimiter(rate_hz=2.0, burst=3.0, clock=lambda: now[0])
+    assert [limiter.admits("a") for _ in range(4)] == [True, True, True, False]
+    assert limiter.admits("b")
     now[0] = 0.6
-    assert [allowance.takes("a") for _ in range(2)] == [True, False]
+    assert [limiter.admits("a") for _ in range(2)] == [True, False]
     now[0] = 100.0
-    assert [allowance.takes("a") for _ in range(4)] == [True, True, True, False]
+    assert [limiter.admits("a") for _ in range(4)] == [True, True, True, False]
 
 
 def test_what_was_charged_has_to_be_waited_for():
     now = [0.0]
-    allowance = RateLimiter(rate_hz=2.0, burst=3.0, clock=lambda: now[0])
-    allowance.charge("a", 5.0)
+    limiter = RateLimiter(rate_hz=2.0, burst=3.0, clock=lambda: now[0])
+    limiter.charge("a", 5.0)
     now[0] = 1.4
-    assert not allowance.takes("a")
+    assert not limiter.admits("a")
     now[0] = 1.6
-    assert allowance.takes("a")
+    assert limiter.admits("a")
 
 
 def test_a_flood_of_clients_is_forgotten():
-    allowance = RateLimiter(clock=time.monotonic)
+    limiter = RateLimiter(clock=time.monotonic)
     for i in range(5000):
-        assert allowance.takes(f"{i}")
-    assert len(allowance._left) <= 1024
+        assert limiter.admits(f"{i}")
+    assert len(limiter._buckets) <= 1024

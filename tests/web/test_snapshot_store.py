@@ -49,7 +49,7 @@ def test_a_robot_is_found_and_everything_fits_together(found):
     assert view.hypotheses == ()
     assert 0.0 < view.time_to_fix_s < 30.0
     assert kinds(found.store) == ["map", "found"]
-    assert "found at (" in found.store.events()[-1].text
+    assert "Localized at (" in found.store.events()[-1].text
 
 
 def test_numbers_of_events_go_up_and_only_the_last_are_kept(found):

@@ -125,7 +125,7 @@ def serve_simulated(
             robot.pause()
         node = SimNode(grid, robot, [store], store.set_truth, complain)
         executor = CommandExecutor(store, node.give, robot)
-        page = Page("sim", store, executor, access, greet=robot.go_on)
+        page = Page("sim", store, executor, access, on_first_viewer=robot.go_on)
         node.start()
         _tell(listening, access)
         with suppress(KeyboardInterrupt):  # the usual end

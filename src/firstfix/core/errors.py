@@ -3,7 +3,7 @@
 ::
 
     FirstfixError
-    └── InputError      what was given cannot be used: expected, received, remedy
+    └── InputError      the input cannot be used
         ├── MapError    ... in a map
         └── ScanError   ... in a scan or a log of scans
 """
@@ -16,10 +16,13 @@ class FirstfixError(Exception):
 
 
 class InputError(FirstfixError):
-    """Input that cannot be used, told in one sentence.
+    """Input that cannot be used.
 
     Parameters
     ----------
+    message : str, optional
+        What is wrong and what to do, in plain sentences. Without it the text is made of the other
+        three, which suit malformed data.
     expected : str
         What would have been right.
     received : str
@@ -28,15 +31,17 @@ class InputError(FirstfixError):
         What the user can do.
     """
 
-    def __init__(self, *, expected: str, received: str, remedy: str) -> None:
+    def __init__(
+        self, message: str = "", *, expected: str = "", received: str = "", remedy: str = ""
+    ) -> None:
         self.expected = expected
         self.received = received
         self.remedy = remedy
-        super().__init__(f"expected {expected}, received {received}; {remedy}")
+        super().__init__(message or f"expected {expected}, received {received}; {remedy}")
 
     def __reduce__(self) -> tuple[object, ...]:
         # Worker processes of `bench` send errors home; keyword-only arguments need help to pickle.
-        return (_rebuild, (type(self), self.expected, self.received, self.remedy))
+        return _rebuild, (type(self), str(self), self.expected, self.received, self.remedy)
 
 
 class MapError(InputError):
@@ -47,5 +52,7 @@ class ScanError(InputError):
     """A scan, or a log of scans, that cannot be used."""
 
 
-def _rebuild(kind: type[InputError], expected: str, received: str, remedy: str) -> InputError:
-    return kind(expected=expected, received=received, remedy=remedy)
+def _rebuild(
+    kind: type[InputError], message: str, expected: str, received: str, remedy: str
+) -> InputError:
+    return kind(message, expected=expected, received=received, remedy=remedy)

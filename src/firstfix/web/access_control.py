@@ -1,4 +1,4 @@
-"""Who may come in: checked before anything else looks at a request."""
+"""Access control: host, origin, token and rate are checked before anything else."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ _READING = {"GET", "HEAD"}
 
 @dataclass(frozen=True, slots=True)
 class AccessPolicy:
-    """What is asked of clients.
+    """Who may see the page, and who may steer.
 
     Parameters
     ----------
     token : str or None
-        What they must know; None for nothing.
+        The token that clients must send; None for no token.
     may_steer : bool
-        False if nobody may do more than watch and ask.
+        False on a read-only server.
     loopback_only : bool
         True if the server cannot be reached from other machines.
     """
@@ -46,28 +46,28 @@ class AccessPolicy:
     may_steer: bool = True
     loopback_only: bool = True
 
-    def knows(self, token: str) -> bool:
-        """Tell whether a token is right, in a time that does not tell how wrong it is."""
+    def accepts(self, token: str) -> bool:
+        """Return whether a token is right, in constant time."""
         return self.token is None or hmac.compare_digest(_as_bytes(token), _as_bytes(self.token))
 
 
 class AccessControl:
-    """Refuses strangers, and hardens what goes out.
+    """ASGI middleware that refuses clients, and adds security headers to every response.
 
     Parameters
     ----------
     app : ASGI application
-        What is guarded.
+        The application behind it.
     access : AccessPolicy
-        What is asked of clients.
-    allowance : RateLimiter
-        How much they may ask for.
+        The policy.
+    rate_limiter : RateLimiter
+        Limits the requests of each client.
     """
 
-    def __init__(self, app: ASGIApp, access: AccessPolicy, allowance: RateLimiter) -> None:
+    def __init__(self, app: ASGIApp, access: AccessPolicy, rate_limiter: RateLimiter) -> None:
         self._app = app
         self._access = access
-        self._allowance = allowance
+        self._rate_limiter = rate_limiter
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request or connection."""
@@ -91,41 +91,41 @@ class AccessControl:
     def _refusal(self, scope: Scope) -> Response | None:
         headers = Headers(scope=scope)
         if "\0" in scope["path"]:
-            return problem(404, "no name has a zero in it")
+            return problem(404, "A path must not contain a null byte.")
         host = headers.get("host", "")
         if self._access.loopback_only and not _is_loopback(host):
-            # Another name for this machine is how a web site of others would get in.
-            return problem(421, "this server answers to localhost and 127.0.0.1 only")
+            # DNS rebinding: a web site gives its own name the address of this machine.
+            return problem(421, "This server answers only to localhost and 127.0.0.1.")
         origin = headers.get("origin")
         is_reading = scope["type"] == "http" and scope["method"] in _READING
         if origin is not None and not is_reading and _host_of(origin) != host:
-            return problem(403, "pages of other sites may not ask for this")
+            return problem(403, "Requests from other web sites are refused.")
         if scope["path"] == "/" or scope["path"].startswith("/static/"):
             return None
         client = client_of(scope)
-        if not self._allowance.takes(client):
-            return problem(429, "too many requests", {"retry-after": "1"})
-        # A browser cannot give headers to a WebSocket: there the first message has the token.
-        if scope["type"] == "http" and not self._knows_token(headers):
-            self._allowance.charge(client, WRONG_TOKEN)
-            return problem(401, "a token is needed", {"www-authenticate": "Bearer"})
+        if not self._rate_limiter.admits(client):
+            return problem(429, "Too many requests. Try again in a second.", {"retry-after": "1"})
+        # Browsers cannot add headers to a WebSocket, so its first message carries the token.
+        if scope["type"] == "http" and not self._has_token(headers):
+            self._rate_limiter.charge(client, WRONG_TOKEN)
+            return problem(401, "A token is needed.", {"www-authenticate": "Bearer"})
         return None
 
-    def _knows_token(self, headers: Headers) -> bool:
+    def _has_token(self, headers: Headers) -> bool:
         kind, _, token = headers.get("authorization", "").partition(" ")
         return self._access.token is None or (
-            kind.lower() == "bearer" and self._access.knows(token.strip())
+            kind.lower() == "bearer" and self._access.accepts(token.strip())
         )
 
 
 def client_of(scope: Scope) -> str:
-    """Return the address of who asks."""
+    """Return the address of the client."""
     address, _ = scope.get("client") or ("?", 0)
     return str(address)
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether a name or address is only reached from this machine."""
+    """Return whether a name or address is reachable from this machine only."""
     if host == "localhost":
         return True
     try:
@@ -139,7 +139,7 @@ def _as_bytes(token: str) -> bytes:
 
 
 def _host_of(origin: str) -> str | None:
-    """Return host and port of an origin; None if it is none."""
+    """Return host and port of an origin; None if it is malformed."""
     try:
         return urlsplit(origin).netloc or None
     except ValueError:
@@ -147,7 +147,7 @@ def _host_of(origin: str) -> str | None:
 
 
 def _is_loopback(header: str) -> bool:
-    """Tell it of a Host header, with a port or without."""
+    """Return `is_loopback` of a Host header, with or without a port."""
     try:
         return is_loopback(urlsplit(f"//{header}").hostname or "")
     except ValueError:

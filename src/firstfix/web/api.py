@@ -1,9 +1,10 @@
-"""The HTTP API; openapi.py describes it."""
+"""The HTTP API. openapi.py describes it."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import msgspec
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -11,38 +12,37 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from firstfix.web.broadcaster import Broadcaster
-from firstfix.web.commands import POSE, Command, checked
+from firstfix.web.commands import Command, Pose, Relocalize, SetPose
+from firstfix.web.json_decoding import decode
 from firstfix.web.locate_queue import LocateQueue
 from firstfix.web.map_png import LEAST_PIXELS, MOST_PIXELS, cells_per_pixel
-from firstfix.web.messages import as_text, map_object, state_message
+from firstfix.web.messages import Accepted, Map, Status
 from firstfix.web.openapi import document
 from firstfix.web.page import Page
-from firstfix.web.request_body import JSON, NPZ, body_of, kind_of
-from firstfix.web.strict_json import parsed
+from firstfix.web.request_body import JSON, NPZ, media_type, read_body
 
-# A pose; nobody needs more words.
-_POSE_BYTES = 16 * 1024
+_MOST_POSE_BYTES = 16 * 1024
 
 
 class Api:
-    """Answers requests.
+    """The request handlers.
 
     Parameters
     ----------
     page : Page
-        What they are about.
+        What they serve.
     broadcaster : Broadcaster
-        Who looks on.
+        Counts the viewers.
     """
 
     def __init__(self, page: Page, broadcaster: Broadcaster) -> None:
         self._page = page
         self._broadcaster = broadcaster
-        self._desk = LocateQueue()
-        self._document = as_text(document())
+        self._queue = LocateQueue()
+        self._document = msgspec.json.encode(document())
 
     def routes(self) -> list[Route]:
-        """Return what is served where."""
+        """Return the routes."""
         return [
             Route("/v1/status", self.status),
             Route("/v1/map", self.map),
@@ -54,62 +54,60 @@ class Api:
         ]
 
     async def status(self, _: Request) -> Response:
-        """Say where the robot is, and why."""
-        return _json(state_message(self._page.store.snapshot, len(self._broadcaster)))
+        """Return the state, and why."""
+        return _json(Status.of(self._page.store.snapshot, len(self._broadcaster)))
 
     async def map(self, _: Request) -> Response:
         """Describe the map."""
-        return _json(map_object(self._page.map()))
+        return _json(Map.of(self._page.map()))
 
     async def map_png(self, request: Request) -> Response:
-        """Draw the map."""
+        """Return the map as a PNG."""
         active_map, most = self._page.map(), _most_pixels(request)
         tag = f'"{active_map.key}-{cells_per_pixel(active_map, most)}"'
         headers = {"etag": tag, "cache-control": "private, no-cache"}
         if tag in request.headers.get("if-none-match", ""):
             return Response(status_code=304, headers=headers)
-        picture = await run_in_threadpool(self._page.pictures.png, active_map, most)
-        return Response(picture, media_type="image/png", headers=headers)
+        png = await run_in_threadpool(self._page.map_pngs.png, active_map, most)
+        return Response(png, media_type="image/png", headers=headers)
 
     async def locate(self, request: Request) -> Response:
-        """Find a scan in the map."""
-        active_map, kind = self._page.map(), kind_of(request, JSON, NPZ)
-        body = await body_of(request)
-        named = request.query_params.get("map")
-        return _json(await self._desk.answer(body, kind, named, active_map))
+        """Search one scan in the map."""
+        active_map, kind = self._page.map(), media_type(request, JSON, NPZ)
+        body = await read_body(request)
+        map_name = request.query_params.get("map")
+        return _json(await self._queue.locate(body, kind, map_name, active_map))
 
     async def pose(self, request: Request) -> Response:
-        """Take the word of a person."""
+        """Take a pose hint."""
         self._page.check_may_steer()
         self._page.map()
-        kind_of(request, JSON)
-        message = parsed(await body_of(request, _POSE_BYTES))
-        return await self._execute(Command("pose", checked(POSE, message)))
+        media_type(request, JSON)
+        pose: Pose = decode(await read_body(request, _MOST_POSE_BYTES), Pose)
+        return await self._execute(SetPose(pose.x, pose.y, pose.yaw))
 
     async def relocalize(self, _: Request) -> Response:
-        """Forget, and search."""
+        """Discard the pose and search the whole map."""
         self._page.check_may_steer()
         self._page.map()
-        return await self._execute(Command("relocalize", {}))
+        return await self._execute(Relocalize())
 
     async def openapi(self, _: Request) -> Response:
-        """Describe all this."""
+        """Describe the API."""
         return Response(self._document, media_type=JSON)
 
-    async def _execute(self, order: Command) -> Response:
-        await run_in_threadpool(self._page.executor.execute, order)
-        return _json({"detail": "the next scan will tell; GET /v1/status says what"}, 202)
+    async def _execute(self, command: Command) -> Response:
+        await run_in_threadpool(self._page.executor.execute, command)
+        return _json(Accepted("The next scan is judged by it. GET /v1/status has the result."), 202)
 
 
-def _json(content: dict[str, Any], status: int = 200) -> Response:
-    headers = {"cache-control": "no-store"}
-    return Response(as_text(content), status, headers, JSON)
+def _json(content: Any, status: int = 200) -> Response:
+    return Response(msgspec.json.encode(content), status, {"cache-control": "no-store"}, JSON)
 
 
 def _most_pixels(request: Request) -> int:
-    told = request.query_params.get("max", str(MOST_PIXELS))
-    if not (told.isascii() and told.isdecimal() and len(told) <= 5):
-        raise HTTPException(422, f"max is a number of pixels from {LEAST_PIXELS}")
-    if int(told) < LEAST_PIXELS:
-        raise HTTPException(422, f"max is at least {LEAST_PIXELS} pixels")
-    return min(int(told), MOST_PIXELS)
+    given = request.query_params.get("max", str(MOST_PIXELS))
+    is_number = given.isascii() and given.isdecimal() and len(given) <= 5
+    if not is_number or int(given) < LEAST_PIXELS:
+        raise HTTPException(422, f"max must be a whole number of at least {LEAST_PIXELS} pixels.")
+    return min(int(given), MOST_PIXELS)

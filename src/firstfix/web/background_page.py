@@ -1,4 +1,4 @@
-"""The page of a robot on a network, served in a thread beside its node."""
+"""The page of a real robot, served in a background thread of its node's process."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ _END_S = 5.0
 
 
 class BackgroundPage:
-    """Serves the page while it exists as a context; `make_node` makes nodes that it shows.
+    """Context manager that serves the page; `make_node` makes the node that it shows.
 
     Parameters
     ----------
     robot : str
         ros1, ros2 or dds.
     map_name : str
-        What the map is called.
+        Name of the map.
     access : AccessPolicy
-        What is asked of viewers.
+        Who may see the page, and who may steer.
     listening : socket
-        Where they come in.
+        The open port.
     """
 
     def __init__(self, robot: str, map_name: str, access: AccessPolicy, listening: socket) -> None:
@@ -54,14 +54,14 @@ class BackgroundPage:
         self._thread.join(_END_S)
 
     def make_node(self, config: NodeConfig, transport: Transport) -> Node:
-        """Make a node that the page shows from now on.
+        """Make the node that the page shows from now on.
 
         Parameters
         ----------
         config : NodeConfig
             Its settings.
         transport : Transport
-            What it hears and speaks through.
+            Its middleware.
 
         Returns
         -------
@@ -74,8 +74,7 @@ class BackgroundPage:
     def _give(self, given: Input) -> None:
         if self._node is None:
             raise InputError(
-                expected="a node that is configured",
-                received="one that is not yet",
-                remedy="configure it: ros2 lifecycle set /firstfix configure",
+                "The node is not configured yet. Configure it: "
+                "ros2 lifecycle set /firstfix configure"
             )
         self._node.give(given)

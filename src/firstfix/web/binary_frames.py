@@ -17,39 +17,40 @@ NO_RETURN = 4
 _HEADER = struct.Struct("<BBHId")
 
 
-def scan_frame(placed: RegisteredScan | None, on: ActiveMap | None) -> bytes:
-    """Write a scan where it was taken, each beam with what the map says to it.
+def scan_frame(registered: RegisteredScan | None, active_map: ActiveMap | None) -> bytes:
+    """Encode a scan in the map frame, with the class of each beam.
 
     Parameters
     ----------
-    placed : RegisteredScan or None
-        The scan; None for nothing to be seen.
-    on : ActiveMap or None
+    registered : RegisteredScan or None
+        The scan and the pose at which it is drawn; None for no scan.
+    active_map : ActiveMap or None
         The map.
 
     Returns
     -------
     bytes
-        Binary message of kind 1. A beam without a return ends where its sight ends.
+        Binary message of kind 1. A beam without a return ends at `range_max`.
     """
-    if placed is None or on is None:
+    if registered is None or active_map is None:
         return _HEADER.pack(SCAN, VERSION, 0, 0, 0.0)
-    beams = classify_beams(placed.scan, placed.T_map_base, on.matcher.fields)
+    scan = registered.scan
+    beams = classify_beams(scan, registered.T_map_base, active_map.matcher.fields)
     classes = np.where(beams.hit, beams.classes, np.uint8(NO_RETURN))
-    header = _HEADER.pack(SCAN, VERSION, 0, len(classes), placed.scan.stamp)
+    header = _HEADER.pack(SCAN, VERSION, 0, len(classes), scan.stamp)
     return header + beams.ends.astype("<f4").tobytes() + classes.tobytes()
 
 
-def particles_frame(belief: ParticleCloud | None, pose: SE2 | None, stamp: float) -> bytes:
-    """Write particles.
+def particles_frame(cloud: ParticleCloud | None, pose: SE2 | None, stamp: float) -> bytes:
+    """Encode particles.
 
     Parameters
     ----------
-    belief : ParticleCloud or None
+    cloud : ParticleCloud or None
         The particles; None for none.
     pose : SE2 or None
-        Where the robot is by now: particles stay behind until they are used again, and are shown
-        moved on with it.
+        ``T_map_base`` now. Particles are moved by the odometry since the last update of the
+        filter.
     stamp : float
         Time of that pose, s.
 
@@ -58,10 +59,10 @@ def particles_frame(belief: ParticleCloud | None, pose: SE2 | None, stamp: float
     bytes
         Binary message of kind 2.
     """
-    if belief is None:
+    if cloud is None:
         return _HEADER.pack(PARTICLES, VERSION, 0, 0, stamp)
-    particles = belief.particles
-    moved = SE2.identity() if pose is None else belief.T_map_base.inverse() @ pose
+    particles = cloud.particles
+    moved = SE2.identity() if pose is None else cloud.T_map_base.inverse() @ pose
     cos, sin = np.cos(particles.yaw), np.sin(particles.yaw)
     poses = np.empty((len(particles), 3), "<f4")
     poses[:, 0] = particles.x + moved.x * cos - moved.y * sin

@@ -1,4 +1,4 @@
-"""Everybody who looks on: what is new is made once and shown to all, newest wins."""
+"""Broadcasting snapshots: each frame is made once for all viewers, and the newest wins."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from firstfix.web.binary_frames import particles_frame, scan_frame
-from firstfix.web.messages import as_text, event_message, state_message
+from firstfix.web.messages import Refusal, Status, encode_text
 from firstfix.web.snapshot import Snapshot
 from firstfix.web.snapshot_store import SnapshotStore
 from firstfix.web.timeline import MOST_EVENTS
 
-# Viewers see what a robot of 20 Hz says at once: a little less than its period.
+# A little less than the period of a robot at 20 Hz, so that each of its scans is sent at once.
 PERIOD_S = 0.045
 MOST_VIEWERS = 64
 
@@ -24,72 +24,75 @@ _log = logging.getLogger(__name__)
 
 
 class Viewer:
-    """What waits to be sent to one viewer: a frame of each kind, and some events."""
+    """The send buffer of one viewer: the newest frame of each kind, and the last events."""
 
     def __init__(self) -> None:
-        self._slots: dict[str, Frame] = {}
+        self._newest: dict[str, Frame] = {}
         self._texts: deque[str] = deque(maxlen=MOST_EVENTS)
-        self._news = asyncio.Event()
+        self._filled = asyncio.Event()
 
-    def show(self, kind: str, frame: Frame) -> None:
-        """Put a frame in the place of the last of its kind."""
-        self._slots[kind] = frame
-        self._news.set()
+    def replace(self, kind: str, frame: Frame) -> None:
+        """Buffer a frame instead of the last one of its kind."""
+        self._newest[kind] = frame
+        self._filled.set()
 
-    def tell(self, text: str) -> None:
-        """Queue what should not be replaced; the oldest goes when there is too much."""
+    def append(self, text: str) -> None:
+        """Buffer a message that must not be replaced; beyond the limit the oldest is dropped."""
         self._texts.append(text)
-        self._news.set()
+        self._filled.set()
 
     def refuse(self, detail: str) -> None:
-        """Say why something that the viewer asked for is not done."""
-        self.tell(as_text({"type": "error", "detail": detail}))
+        """Report why a command of the viewer was not executed."""
+        self.append(encode_text(Refusal(detail)))
 
     async def next(self) -> list[Frame]:
-        """Wait for something, and take all of it, in the order in which it makes sense."""
-        await self._news.wait()
-        self._news.clear()
-        hello = self._slots.pop("hello", None)
-        frames = [*([hello] if hello is not None else []), *self._texts, *self._slots.values()]
+        """Wait until there is something, and take everything in the order of sending."""
+        await self._filled.wait()
+        self._filled.clear()
+        hello = self._newest.pop("hello", None)
+        frames = [*([hello] if hello is not None else []), *self._texts, *self._newest.values()]
         self._texts.clear()
-        self._slots.clear()
+        self._newest.clear()
         return frames
 
 
 class Broadcaster:
-    """All viewers, and the task that shows them what is new.
+    """The connected viewers, and the task that sends them what is new.
 
     Parameters
     ----------
     store : SnapshotStore
-        What there is to be seen.
+        What is sent.
     hello : callable
-        Describes the robot and a map to a viewer.
-    greet : callable
-        Called when the first viewer comes.
+        Returns the first message to a viewer.
+    on_first_viewer : callable
+        Called when the first viewer connects.
     """
 
     def __init__(
-        self, store: SnapshotStore, hello: Callable[[], str], greet: Callable[[], None]
+        self,
+        store: SnapshotStore,
+        hello: Callable[[], str],
+        on_first_viewer: Callable[[], None],
     ) -> None:
         self._store = store
         self._hello = hello
-        self._greet = greet
-        self._is_greeted = False
+        self._on_first_viewer = on_first_viewer
+        self._had_viewers = False
         self._viewers: set[Viewer] = set()
         self._changed = asyncio.Event()
-        self._shown = Snapshot()
+        self._sent = Snapshot()
         self._next_event = 0
 
     def __len__(self) -> int:
         return len(self._viewers)
 
     async def run(self) -> None:
-        """Show what is new, at most so many times a second, until cancelled."""
+        """Broadcast what is new, at most once per period, until cancelled."""
         loop = asyncio.get_running_loop()
 
         def wake() -> None:
-            with suppress(RuntimeError):  # the server has just ended
+            with suppress(RuntimeError):  # the loop has just been closed
                 loop.call_soon_threadsafe(self._changed.set)
 
         self._store.subscribe(wake)
@@ -98,64 +101,61 @@ class Broadcaster:
                 await self._changed.wait()
                 self._changed.clear()
                 if self._viewers:
-                    self._try_to_show_news()
+                    self._try_to_broadcast()
                 await asyncio.sleep(PERIOD_S)
         finally:
             self._store.unsubscribe(wake)
 
     def join(self) -> Viewer | None:
-        """Let a viewer in, and show all that there is; None if there are too many already."""
+        """Add a viewer and send it everything; None if there are too many."""
         if len(self) >= MOST_VIEWERS:
             return None
-        self._show_news()
+        self._broadcast()
         viewer = Viewer()
         self._viewers.add(viewer)
-        viewer.show("hello", self._hello())
-        for kind, frame in self._frames(self._shown, None).items():
-            viewer.show(kind, frame)
-        self._changed.set()  # the others see that there is one more
-        if not self._is_greeted:
-            self._is_greeted = True
-            self._greet()
+        viewer.replace("hello", self._hello())
+        for kind, frame in self._frames(self._sent, None).items():
+            viewer.replace(kind, frame)
+        self._changed.set()  # the count of viewers has changed
+        if not self._had_viewers:
+            self._had_viewers = True
+            self._on_first_viewer()
         return viewer
 
     def leave(self, viewer: Viewer) -> None:
-        """Let a viewer go."""
+        """Remove a viewer."""
         self._viewers.discard(viewer)
         self._changed.set()
 
-    def _try_to_show_news(self) -> None:
+    def _try_to_broadcast(self) -> None:
         try:
-            self._show_news()
-        except Exception:  # noqa: BLE001 - viewers who see nothing more would not know why
-            _log.exception("what there is to be seen could not be shown")
+            self._broadcast()
+        except Exception:  # noqa: BLE001 - the next snapshot may work
+            _log.exception("A snapshot could not be sent to the viewers.")
 
-    def _show_news(self) -> None:
-        before, snapshot = self._shown, self._store.snapshot
-        self._shown = snapshot
+    def _broadcast(self) -> None:
+        before, snapshot = self._sent, self._store.snapshot
+        self._sent = snapshot
         if snapshot.map is not before.map:
-            self._show("hello", self._hello())
+            self._replace("hello", self._hello())
         for event in self._store.events(self._next_event):
             self._next_event = event.number + 1
-            text = as_text(event_message(event))
+            text = encode_text(event)
             for viewer in self._viewers:
-                viewer.tell(text)
+                viewer.append(text)
         for kind, frame in self._frames(snapshot, before).items():
-            self._show(kind, frame)
+            self._replace(kind, frame)
 
-    def _show(self, kind: str, frame: Frame) -> None:
+    def _replace(self, kind: str, frame: Frame) -> None:
         for viewer in self._viewers:
-            viewer.show(kind, frame)
+            viewer.replace(kind, frame)
 
     def _frames(self, snapshot: Snapshot, before: Snapshot | None) -> dict[str, Frame]:
-        """Make the frames that differ from those of a snapshot before; all if there was none."""
-        frames: dict[str, Frame] = {"state": as_text(state_message(snapshot, len(self)))}
+        """Encode what differs from an earlier snapshot; everything if there was none."""
+        frames: dict[str, Frame] = {"state": encode_text(Status.of(snapshot, len(self)))}
         if before is None or before.scan is not snapshot.scan:
             frames["scan"] = scan_frame(snapshot.scan, snapshot.map)
-        if (
-            before is None
-            or before.particles is not snapshot.particles
-            or before.pose != snapshot.pose
-        ):
+        moved = before is None or before.pose != snapshot.pose
+        if moved or before is None or before.particles is not snapshot.particles:
             frames["particles"] = particles_frame(snapshot.particles, snapshot.pose, snapshot.stamp)
         return frames

@@ -1,4 +1,4 @@
-"""Carrying out what viewers ask for."""
+"""Executing the commands of viewers."""
 
 from __future__ import annotations
 
@@ -8,42 +8,52 @@ from typing import Protocol
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.localizer.inputs import Input, PoseHint, Reset
-from firstfix.web.commands import Command
+from firstfix.web.commands import (
+    Carry,
+    Command,
+    DriveTo,
+    Pause,
+    PickPlace,
+    Relocalize,
+    SetPeople,
+    SetPose,
+    SimulationCommand,
+)
 from firstfix.web.snapshot_store import SnapshotStore
 
 ABILITIES = ("goal", "carry", "people", "pause")
 
 
 class ControllableRobot(Protocol):
-    """A simulated robot that viewers of the page can move."""
+    """A simulated robot that viewers of the page control."""
 
     def pause(self) -> None:
-        """Stop the simulated time."""
+        """Stop the simulated clock."""
 
     def go_on(self) -> None:
-        """Let the simulated time run again."""
+        """Resume the simulated clock."""
 
     def drive_to(self, x: float, y: float) -> None:
         """Drive to a point of the map, m."""
 
     def carry_to(self, T_map_base: SE2) -> None:
-        """Lift the robot and set it down elsewhere."""
+        """Lift the robot and set it down at a pose."""
 
     def meet(self, people: int) -> None:
         """Let people walk around the robot."""
 
 
 class CommandExecutor:
-    """Tells the localizer, and the simulated robot if there is one, what people want.
+    """Passes commands to the localizer, and to the simulated robot if there is one.
 
     Parameters
     ----------
     store : SnapshotStore
-        Knows the time and the hypotheses.
+        Has the time and the hypotheses.
     give : callable
-        Hands an input to the localizer; from any thread.
+        Takes an input for the localizer, from any thread.
     robot : ControllableRobot or None
-        Who can be sent about.
+        The simulated robot.
     """
 
     def __init__(
@@ -58,59 +68,56 @@ class CommandExecutor:
 
     @property
     def abilities(self) -> tuple[str, ...]:
-        """Which orders can be carried out besides those that every robot can."""
+        """Tags of the commands that only a simulated robot can execute; empty on a real one."""
         return () if self._robot is None else ABILITIES
 
-    def execute(self, order: Command) -> None:
-        """Carry out an order; may take as long as planning a way.
+    def execute(self, command: Command) -> None:
+        """Execute a command; may take as long as planning a path.
 
         Raises
         ------
         InputError
-            If that cannot be done.
+            If it cannot be executed.
         """
-        given = order.given
-        if order.kind == "pose":
-            self._hint(SE2(**given))
-        elif order.kind == "pick":
-            self._hint(self._hypothesis(given["index"]))
-        elif order.kind == "relocalize":
-            self._store.add_event("person", "asked to search anew")
-            self._give(Reset(self._store.snapshot.stamp))
-        elif self._robot is None:
-            raise InputError(
-                expected="a simulated robot",
-                received="a real one",
-                remedy="steer it as it is usually steered",
-            )
-        else:
-            self._steer(self._robot, order)
+        match command:
+            case SetPose():
+                self._give(PoseHint(self._store.snapshot.stamp, command.T_map_base))
+            case PickPlace():
+                self._pick(command.id)
+            case Relocalize():
+                self._store.add_event("person", "Relocalization requested")
+                self._give(Reset(self._store.snapshot.stamp))
+            case _ if self._robot is not None:
+                self._control(self._robot, command)
+            case DriveTo():
+                raise InputError(
+                    "Goals can be set here only in simulation. Use your navigation stack."
+                )
+            case _:
+                raise InputError("This command works only with a simulated robot.")
 
-    def _hint(self, T_map_base: SE2) -> None:
-        self._give(PoseHint(self._store.snapshot.stamp, T_map_base))
+    def _pick(self, hypothesis_id: int) -> None:
+        snapshot = self._store.snapshot
+        for place in snapshot.hypotheses:
+            if place.id == hypothesis_id:
+                hint = PoseHint(snapshot.stamp, place.pose, hypothesis_id=hypothesis_id)
+                self._give(hint)
+                return
+        raise InputError("That place is no longer in the list. Pick one of the places shown.")
 
-    def _hypothesis(self, index: int) -> SE2:
-        places = self._store.snapshot.hypotheses
-        if index >= len(places):
-            raise InputError(
-                expected=f"one of {len(places)} hypotheses",
-                received=f"index {index}",
-                remedy="the last state lists them",
-            )
-        return places[index].pose
-
-    def _steer(self, robot: ControllableRobot, order: Command) -> None:
-        given = order.given
-        if order.kind == "pause":
-            (robot.pause if given["paused"] else robot.go_on)()
-            self._store.set_paused(paused=given["paused"])
-            self._store.add_event("person", "pause" if given["paused"] else "go on")
-        elif order.kind == "goal":
-            robot.drive_to(given["x"], given["y"])
-            self._store.add_event("person", f"sent to ({given['x']:.2f}, {given['y']:.2f}) m")
-        elif order.kind == "carry":
-            robot.carry_to(SE2(**given))
-            self._store.add_event("person", f"carried to ({given['x']:.2f}, {given['y']:.2f}) m")
-        else:
-            robot.meet(given["count"])
-            self._store.add_event("person", f"{given['count']} people around the robot")
+    def _control(self, robot: ControllableRobot, command: SimulationCommand) -> None:
+        match command:
+            case Pause(paused=paused):
+                (robot.pause if paused else robot.go_on)()
+                self._store.set_paused(paused=paused)
+                event = "Simulation paused" if paused else "Simulation resumed"
+            case DriveTo(x=x, y=y):
+                robot.drive_to(x, y)
+                event = f"Goal set: ({x:.2f}, {y:.2f}) m"
+            case Carry(x=x, y=y):
+                robot.carry_to(command.T_map_base)
+                event = f"Carried to ({x:.2f}, {y:.2f}) m"
+            case SetPeople(count=count):
+                robot.meet(count)
+                event = f"{count} people walk around the robot"
+        self._store.add_event("person", event)

@@ -1,170 +1,81 @@
-"""What a viewer may ask for: one table that checks messages, and describes them to others."""
+"""The commands of clients: one struct declares, checks, decodes and documents each."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
-from firstfix.core.errors import InputError
-from firstfix.web.strict_json import shown
+from msgspec import Meta, Struct
 
-# Farther than any building, and well within what cells can be counted by.
+from firstfix.core.se2 import SE2
+
+# Larger than any building, and small enough for indices of cells.
 FARTHEST_M = 1e6
+MOST_PEOPLE = 30
+
+X = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M, description="x in the map frame, m")]
+Y = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M, description="y in the map frame, m")]
+Yaw = Annotated[
+    float,
+    Meta(ge=-FARTHEST_M, le=FARTHEST_M, description="heading, rad, counter-clockwise from +x"),
+]
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """One entry of a message.
+class Pose(Struct, frozen=True):
+    """A pose of the robot's base in the map frame."""
 
-    Parameters
-    ----------
-    kind : type
-        float, int or bool.
-    description : str
-        What it means.
-    least, most : float
-        Range of a number.
-    """
+    x: X
+    y: Y
+    yaw: Yaw
 
-    kind: type
-    description: str
-    least: float = -FARTHEST_M
-    most: float = FARTHEST_M
-
-    def schema(self) -> dict[str, Any]:
-        """Describe it in JSON Schema."""
-        if self.kind is bool:
-            return {"type": "boolean", "description": self.description}
-        return {
-            "type": "integer" if self.kind is int else "number",
-            "description": self.description,
-            "minimum": self.least,
-            "maximum": self.most,
-        }
-
-    def checked(self, name: str, value: Any) -> Any:
-        """Return a value as it shall be.
-
-        Raises
-        ------
-        InputError
-            If it cannot be meant.
-        """
-        if self.kind is bool:
-            if isinstance(value, bool):
-                return value
-        elif isinstance(value, int | float) and not isinstance(value, bool):
-            whole = self.kind is not int or value == int(value) if _is_finite(value) else False
-            if whole and self.least <= value <= self.most:
-                return self.kind(value)
-        words = {bool: "true or false", int: "a whole number", float: "a number"}[self.kind]
-        limits = "" if self.kind is bool else f" from {self.least:g} to {self.most:g}"
-        raise InputError(
-            expected=f"{name} as {words}{limits}",
-            received=shown(value),
-            remedy=f"{name} is {self.description}",
-        )
+    @property
+    def T_map_base(self) -> SE2:
+        """The pose as a transform."""
+        return SE2(self.x, self.y, self.yaw)
 
 
-_X = Entry(float, "x in the map frame, m")
-_Y = Entry(float, "y in the map frame, m")
-_YAW = Entry(float, "the heading, rad, counter-clockwise from +x")
-
-POSE = {"x": _X, "y": _Y, "yaw": _YAW}
-
-COMMANDS: dict[str, dict[str, Entry]] = {
-    "pose": POSE,
-    "pick": {"index": Entry(int, "which of the hypotheses of the last state, from 0", 0, 1000)},
-    "relocalize": {},
-    "pause": {"paused": Entry(bool, "whether the clock of the simulated robot stands still")},
-    "goal": {"x": _X, "y": _Y},
-    "carry": POSE,
-    "people": {"count": Entry(int, "how many people walk around the robot", 0, 30)},
-}
+class SetPose(Pose, frozen=True, tag_field="type", tag="pose"):
+    """A person says where the robot is."""
 
 
-@dataclass(frozen=True, slots=True)
-class Command:
-    """A checked message.
+class PickPlace(Struct, frozen=True, tag_field="type", tag="pick"):
+    """A person chooses one of the hypotheses."""
 
-    Parameters
-    ----------
-    kind : str
-        A key of `COMMANDS`.
-    given : dict
-        Its entries, all of them.
-    """
-
-    kind: str
-    given: dict[str, Any]
+    id: Annotated[int, Meta(ge=0, description="id of the hypothesis")]
 
 
-def decode_command(message: Any) -> Command:
-    """Check a message of a viewer.
-
-    Parameters
-    ----------
-    message : object
-        What its JSON says.
-
-    Returns
-    -------
-    Command
-        What it asks for.
-
-    Raises
-    ------
-    InputError
-        If it says nothing that is known, or not all that is needed.
-    """
-    kind = message.get("type") if isinstance(message, Mapping) else None
-    if not isinstance(kind, str) or kind not in COMMANDS:
-        raise InputError(
-            expected=f"an object whose type is one of {', '.join(COMMANDS)}",
-            received=shown(message),
-            remedy="see docs/live.md",
-        )
-    return Command(kind, checked(COMMANDS[kind], message))
+class Relocalize(Struct, frozen=True, tag_field="type", tag="relocalize"):
+    """Discard the pose and search the whole map."""
 
 
-def checked(entries: Mapping[str, Entry], message: Any) -> dict[str, Any]:
-    """Check the entries of a message.
+class Pause(Struct, frozen=True, tag_field="type", tag="pause"):
+    """Stop or resume the clock of the simulated robot."""
 
-    Parameters
-    ----------
-    entries : mapping of str to Entry
-        What must be there; whatever else is there is passed over.
-    message : object
-        What its JSON says.
-
-    Returns
-    -------
-    dict
-        Each entry, of its kind.
-
-    Raises
-    ------
-    InputError
-        If one is missing or cannot be meant.
-    """
-    if not isinstance(message, Mapping):
-        raise InputError(
-            expected="a JSON object", received=shown(message), remedy="see docs/live.md"
-        )
-    for name in entries:
-        if name not in message:
-            raise InputError(
-                expected=f"{name}: {entries[name].description}",
-                received="a message without it",
-                remedy="see docs/live.md",
-            )
-    return {name: entry.checked(name, message[name]) for name, entry in entries.items()}
+    paused: bool
 
 
-def _is_finite(value: float) -> bool:
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # a whole number beyond all floats
-        return False
+class DriveTo(Struct, frozen=True, tag_field="type", tag="goal"):
+    """Send the simulated robot to a point."""
+
+    x: X
+    y: Y
+
+
+class Carry(Pose, frozen=True, tag_field="type", tag="carry"):
+    """Pick the simulated robot up and set it down at a pose."""
+
+
+class SetPeople(Struct, frozen=True, tag_field="type", tag="people"):
+    """Let people walk around the simulated robot."""
+
+    count: Annotated[int, Meta(ge=0, le=MOST_PEOPLE, description="number of people")]
+
+
+class Token(Struct, frozen=True, tag_field="type", tag="token"):
+    """Authenticate; the first message where the server asks for a token."""
+
+    token: str
+
+
+SimulationCommand = Pause | DriveTo | Carry | SetPeople
+Command = SetPose | PickPlace | Relocalize | SimulationCommand
+ClientMessage = Command | Token

@@ -1,144 +1,124 @@
-"""``POST /v1/locate``: one scan in, one answer out, the robot itself not touched."""
+"""``POST /v1/locate``: one scan in, one answer out; the state of the robot does not change."""
 
 from __future__ import annotations
 
 import asyncio
 import io
 import math
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from msgspec import Meta, Struct
 from starlette.exceptions import HTTPException
 
-from firstfix.core.errors import InputError
 from firstfix.core.scan import MAX_BEAMS, LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.io.answers import answer_document
 from firstfix.io.logs.npz import read_scan
-from firstfix.web.commands import POSE, Entry, checked
+from firstfix.web.commands import X, Y, Yaw
+from firstfix.web.json_decoding import decode
 from firstfix.web.request_body import JSON
 from firstfix.web.snapshot import ActiveMap
-from firstfix.web.strict_json import parsed, shown
 
-SENSOR = {
-    "angle_min": Entry(float, "bearing of the first beam, rad", -100.0, 100.0),
-    "angle_increment": Entry(float, "step from beam to beam, rad", -10.0, 10.0),
-    "range_min": Entry(float, "what is nearer is no reading, m", 0.0),
-    "range_max": Entry(float, "reach of the sensor, m", 0.0),
-}
-OPTIONAL = ("T_base_laser", "map")
-
-# One search runs, and so many wait for it.
+# One search runs, and this many wait.
 MOST_WAITING = 4
 
-# What a scan may unpack to: sixteen bytes for each beam, and all the rest.
+# Limit of an unpacked .npz: sixteen bytes a beam, and 1 MiB for everything else.
 _UNPACKED_BYTES = 16 * MAX_BEAMS + 2**20
 
 
+class Scan(Struct, frozen=True, forbid_unknown_fields=True):
+    """A scan, as `sensor_msgs/LaserScan` has it."""
+
+    ranges: Annotated[
+        list[float | None],
+        Meta(min_length=1, max_length=MAX_BEAMS, description="m; null for no return"),
+    ]
+    angle_min: Annotated[
+        float, Meta(ge=-100.0, le=100.0, description="bearing of the first beam, rad")
+    ]
+    angle_increment: Annotated[
+        float, Meta(ge=-10.0, le=10.0, description="step between beams, rad")
+    ]
+    range_min: Annotated[float, Meta(ge=0.0, le=1e6, description="shortest valid range, m")]
+    range_max: Annotated[float, Meta(ge=0.0, le=1e6, description="longest valid range, m")]
+    T_base_laser: Annotated[
+        tuple[X, Y, Yaw], Meta(description="pose of the sensor on the robot: x m, y m, yaw rad")
+    ] = (0.0, 0.0, 0.0)
+    map: Annotated[str | None, Meta(description="name of the map; any if null")] = None
+
+    def laser_scan(self) -> LaserScan:
+        """Convert it.
+
+        Raises
+        ------
+        ScanError
+            If its fields contradict each other.
+        """
+        metres = np.array([math.inf if r is None else r for r in self.ranges], np.float64)
+        with np.errstate(over="ignore"):  # beyond the largest float32: infinity
+            ranges = metres.astype(np.float32)
+        return LaserScan(
+            ranges=ranges,
+            angle_min=self.angle_min,
+            angle_increment=self.angle_increment,
+            range_min=self.range_min,
+            range_max=self.range_max,
+            T_base_laser=SE2(*self.T_base_laser),
+        )
+
+
 class LocateQueue:
-    """Where searches queue: one at a time, so that the robot itself is not kept waiting."""
+    """Runs one search at a time, so that the robot's own localizer keeps its processor."""
 
     def __init__(self) -> None:
-        self._turn = asyncio.Lock()
-        self._inside = 0
+        self._running = asyncio.Lock()
+        self._requests = 0
 
-    async def answer(
-        self, body: bytes, kind: str, named: str | None, on: ActiveMap
+    async def locate(
+        self, body: bytes, kind: str, map_name: str | None, active_map: ActiveMap
     ) -> dict[str, Any]:
-        """Search.
+        """Search the scan of a request body.
 
         Parameters
         ----------
         body : bytes
-            JSON or npz.
+            JSON or .npz.
         kind : str
-            Its media type.
-        named : str or None
-            The map that is meant, where the body cannot say it.
-        on : ActiveMap
+            Media type of the body.
+        map_name : str or None
+            The map that the client expects, where the body does not name one.
+        active_map : ActiveMap
             The map in use.
 
         Returns
         -------
         dict
-            The answer, as docs/json.md has it.
+            The answer of docs/json.md.
 
         Raises
         ------
         HTTPException
-            If too many wait, the body is none, or another map is meant.
+            503 if too many requests wait, 404 if the client expects another map.
         InputError
-            If there is no scan in it.
+            If the body is not a scan.
         """
-        if self._inside > MOST_WAITING:
-            raise HTTPException(503, "too many searches wait already", {"retry-after": "1"})
-        self._inside += 1
+        if self._requests > MOST_WAITING:
+            raise HTTPException(503, "Too many searches are waiting.", {"retry-after": "1"})
+        self._requests += 1
         try:
-            async with self._turn:
-                return await asyncio.to_thread(_answer, body, kind, named, on)
+            async with self._running:
+                return await asyncio.to_thread(_locate, body, kind, map_name, active_map)
         finally:
-            self._inside -= 1
+            self._requests -= 1
 
 
-def _answer(body: bytes, kind: str, named: str | None, on: ActiveMap) -> dict[str, Any]:
+def _locate(body: bytes, kind: str, map_name: str | None, active_map: ActiveMap) -> dict[str, Any]:
     if kind == JSON:
-        message = parsed(body)
-        scan = _scan_of(message)
-        named = _text(message.get("map", named))
+        message = decode(body, Scan)
+        scan, map_name = message.laser_scan(), message.map or map_name
     else:
         scan = read_scan(io.BytesIO(body), _UNPACKED_BYTES)
-    if named is not None and named != on.name:
-        raise HTTPException(404, f"there is one map here, and its name is {on.name!r:.60}")
-    return answer_document(0, on.matcher.locate(scan), None)
-
-
-def _scan_of(message: Any) -> LaserScan:
-    sensor = checked(SENSOR, message)
-    unknown = set(message) - {"ranges", *SENSOR, *OPTIONAL}
-    if unknown:
-        raise InputError(
-            expected=f"ranges, {', '.join(SENSOR)} and perhaps {' and '.join(OPTIONAL)}",
-            received=shown(min(unknown)),
-            remedy="leave it out, or correct its name",
-        )
-    return LaserScan(
-        ranges=_ranges(message.get("ranges")),
-        T_base_laser=_place(message.get("T_base_laser", [0.0, 0.0, 0.0])),
-        **sensor,
-    )
-
-
-def _ranges(given: Any) -> NDArray[np.float32]:
-    if not isinstance(given, list) or not 1 <= len(given) <= MAX_BEAMS:
-        raise InputError(
-            expected=f"ranges as a list of 1 to {MAX_BEAMS} numbers",
-            received=shown(given),
-            remedy="send one scan at a time",
-        )
-    for value in given:
-        if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
-            raise InputError(
-                expected="ranges as numbers, m, or null where nothing returned",
-                received=shown(value),
-                remedy="send numbers",
-            )
-    ranges = np.array([math.inf if value is None else value for value in given], np.float64)
-    with np.errstate(over="ignore"):  # what float32 cannot hold is infinitely far
-        return ranges.astype(np.float32)
-
-
-def _place(given: Any) -> SE2:
-    if not isinstance(given, list) or len(given) != len(POSE):
-        raise InputError(
-            expected="T_base_laser as [x, y, yaw]",
-            received=shown(given),
-            remedy="leave it out where the base is the sensor",
-        )
-    return SE2(**checked(POSE, dict(zip(POSE, given, strict=True))))
-
-
-def _text(given: Any) -> str | None:
-    if given is not None and not isinstance(given, str):
-        raise InputError(expected="map as a name", received=shown(given), remedy="leave it out")
-    return given
+    if map_name is not None and map_name != active_map.name:
+        raise HTTPException(404, f"The only map here is {active_map.name!r:.60}.")
+    return answer_document(0, active_map.matcher.locate(scan), None)

@@ -1,121 +1,191 @@
-"""What is seen, as the JSON messages of docs/live.md."""
+"""The messages of the server: one struct declares, encodes and documents each (docs/live.md)."""
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict
-from typing import Any
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta, Struct
 
 from firstfix import __version__
+from firstfix.core.estimate import Evidence, Hypothesis, SearchReport, Verdict
 from firstfix.core.se2 import SE2
-from firstfix.io.answers import finite
-from firstfix.web.map_png import image_of
+from firstfix.localizer.states import State
+from firstfix.web.map_png import png_layout
 from firstfix.web.snapshot import ActiveMap, Snapshot
 from firstfix.web.timeline import Event
 
+Count = Annotated[int, Meta(ge=0)]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+Pose = Annotated[tuple[float, float, float], Meta(description="x m, y m, yaw rad")]
+Row = tuple[float, float, float]
 
-def pose_list(pose: SE2 | None) -> list[float] | None:
+
+class MapImage(Struct, frozen=True):
+    """The PNG of a map; its lower-left corner is that of the map."""
+
+    width: Count
+    height: Count
+    resolution: Annotated[float, Meta(description="m per pixel")]
+    url: str
+
+
+class Map(Struct, frozen=True):
+    """The map in use."""
+
+    name: str
+    width: Count
+    height: Count
+    resolution: Annotated[float, Meta(description="m per cell")]
+    origin: Pose
+    image: MapImage
+
+    @classmethod
+    def of(cls, active_map: ActiveMap) -> Map:
+        """Describe a map."""
+        grid = active_map.grid
+        width, height, resolution = png_layout(active_map)
+        return cls(
+            name=active_map.name,
+            width=grid.width,
+            height=grid.height,
+            resolution=grid.resolution,
+            origin=as_tuple(grid.T_map_grid),
+            image=MapImage(width, height, resolution, f"/v1/map.png?v={active_map.key[:12]}"),
+        )
+
+
+class Place(Struct, frozen=True):
+    """A hypothesis: one place where the robot may be."""
+
+    id: Annotated[int | None, Meta(description="stays the same while the place is listed")]
+    pose: Pose
+    probability: Share
+    explained: Annotated[Share, Meta(description="share of the beams that the map explains here")]
+
+    @classmethod
+    def of(cls, hypothesis: Hypothesis) -> Place:
+        """Describe a hypothesis."""
+        return cls(
+            hypothesis.id,
+            as_tuple(hypothesis.pose),
+            hypothesis.probability,
+            hypothesis.evidence.explained,
+        )
+
+
+class Motion(Struct, frozen=True):
+    """A motion that would decide between the hypotheses."""
+
+    turn: Annotated[float, Meta(description="turn first, rad, counter-clockwise")]
+    ahead: Annotated[float, Meta(description="then drive straight, m")]
+
+
+class Hello(Struct, frozen=True, tag_field="type", tag="hello"):
+    """The first message: what the robot is and what can be done."""
+
+    robot: str
+    may_steer: bool
+    abilities: tuple[str, ...]
+    map: Map | None
+    events: list[Event]
+    version: str = __version__
+
+
+class Status(Struct, frozen=True, tag_field="type", tag="state"):
+    """The state of the localizer and everything that explains it."""
+
+    stamp: float
+    state: State
+    reason: str
+    pose: Pose | None
+    covariance: Annotated[
+        tuple[float, float, float, float] | None, Meta(description="xx, xy, yy, yaw yaw")
+    ]
+    hypotheses: list[Place]
+    rivals: Annotated[Count, Meta(description="places that fit about equally well")]
+    chosen_by: Annotated[
+        str | None, Meta(description="who chose among them, until evidence decides")
+    ]
+    evidence: Evidence | None
+    particles: Count
+    cpu_ms: float | None
+    time_to_fix_s: float | None
+    motion: Motion | None
+    truth: Pose | None
+    paused: bool
+    viewers: Count
+
+    @classmethod
+    def of(cls, snapshot: Snapshot, viewers: int) -> Status:
+        """Describe a snapshot."""
+        pose, motion, cloud = snapshot.pose, snapshot.motion, snapshot.particles
+        return cls(
+            stamp=snapshot.stamp,
+            state=snapshot.state,
+            reason=snapshot.reason,
+            pose=None if pose is None else as_tuple(pose),
+            covariance=_covariance(snapshot),
+            hypotheses=[Place.of(hypothesis) for hypothesis in snapshot.hypotheses],
+            rivals=snapshot.rivals,
+            chosen_by=snapshot.chosen_by,
+            evidence=snapshot.evidence,
+            particles=0 if cloud is None else len(cloud.particles),
+            cpu_ms=snapshot.cpu_ms,
+            time_to_fix_s=snapshot.time_to_fix_s,
+            motion=None if motion is None else Motion(motion.turn, motion.ahead),
+            truth=None if snapshot.truth is None else as_tuple(snapshot.truth),
+            paused=snapshot.paused,
+            viewers=viewers,
+        )
+
+
+class Refusal(Struct, frozen=True, tag_field="type", tag="error"):
+    """Why a command of this viewer was not executed."""
+
+    detail: str
+
+
+class Accepted(Struct, frozen=True):
+    """A command was handed to the localizer."""
+
+    detail: str
+
+
+class LocatedPlace(Struct, frozen=True):
+    """A hypothesis of `POST /v1/locate`."""
+
+    pose: Pose
+    covariance: tuple[Row, Row, Row]
+    score: float
+    probability: Share
+    evidence: Evidence
+
+
+class Answer(Struct, frozen=True):
+    """The answer of `POST /v1/locate`, as docs/json.md describes it."""
+
+    index: Count
+    verdict: Verdict
+    reason: str
+    pose: Pose | None
+    covariance: tuple[Row, Row, Row] | None
+    hypotheses: list[LocatedPlace]
+    search: SearchReport
+    elapsed_s: float
+    error: None
+
+
+def as_tuple(pose: SE2) -> tuple[float, float, float]:
     """Write a pose as x (m), y (m), yaw (rad)."""
-    return None if pose is None else [pose.x, pose.y, pose.yaw]
+    return pose.x, pose.y, pose.yaw
 
 
-def map_object(active_map: ActiveMap) -> dict[str, Any]:
-    """Describe the map in use: name, cells, place, and where its picture is."""
-    grid = active_map.grid
-    return {
-        "name": active_map.name,
-        "width": grid.width,
-        "height": grid.height,
-        "resolution": grid.resolution,
-        "origin": pose_list(grid.T_map_grid),
-        "image": image_of(active_map),
-    }
+def encode_text(message: Struct) -> str:
+    """Encode a message as JSON; NaN and infinity become null."""
+    return msgspec.json.encode(message).decode()
 
 
-def event_message(event: Event) -> dict[str, Any]:
-    """Describe an event."""
-    return {
-        "type": "event",
-        "number": event.number,
-        "stamp": event.stamp,
-        "kind": event.kind,
-        "text": event.text,
-    }
-
-
-def hello_message(
-    robot: str,
-    abilities: tuple[str, ...],
-    active_map: ActiveMap | None,
-    events: list[Event],
-    *,
-    may_steer: bool,
-) -> dict[str, Any]:
-    """Describe what a viewer needs to know before all else.
-
-    Parameters
-    ----------
-    robot : str
-        sim, ros1, ros2 or dds.
-    abilities : tuple of str
-        What the robot can be told besides where it is.
-    active_map : ActiveMap or None
-        The map.
-    events : list of Event
-        What has happened so far.
-    may_steer : bool
-        False for those who may only watch.
-
-    Returns
-    -------
-    dict
-        Ready for JSON.
-    """
-    return {
-        "type": "hello",
-        "version": __version__,
-        "robot": robot,
-        "may_steer": may_steer,
-        "abilities": list(abilities),
-        "map": None if active_map is None else map_object(active_map),
-        "events": [event_message(event) for event in events],
-    }
-
-
-def state_message(snapshot: Snapshot, viewers: int) -> dict[str, Any]:
-    """Describe the state, for ``viewers`` of them."""
-    covariance, evidence, motion = snapshot.covariance, snapshot.evidence, snapshot.motion
-    return {
-        "type": "state",
-        "stamp": snapshot.stamp,
-        "state": snapshot.state.value,
-        "reason": snapshot.reason,
-        "pose": pose_list(snapshot.pose),
-        "covariance": None
-        if covariance is None
-        else [float(covariance[i]) for i in ((0, 0), (0, 1), (1, 1), (2, 2))],
-        "hypotheses": [
-            {
-                "pose": pose_list(place.pose),
-                "probability": place.probability,
-                "explained": place.evidence.explained,
-            }
-            for place in snapshot.hypotheses
-        ],
-        "evidence": None if evidence is None else asdict(evidence),
-        "particles": 0 if snapshot.particles is None else len(snapshot.particles.particles),
-        "cpu_ms": snapshot.cpu_ms,
-        "time_to_fix_s": snapshot.time_to_fix_s,
-        "motion": None if motion is None else {"turn": motion.turn, "ahead": motion.ahead},
-        "truth": pose_list(snapshot.truth),
-        "paused": snapshot.paused,
-        "viewers": viewers,
-    }
-
-
-def as_text(message: dict[str, Any]) -> str:
-    """Write a message; what JSON cannot say becomes null."""
-    try:
-        return json.dumps(message, allow_nan=False, separators=(",", ":"))
-    except ValueError:
-        return json.dumps(finite(message), separators=(",", ":"))
+def _covariance(snapshot: Snapshot) -> tuple[float, float, float, float] | None:
+    P = snapshot.covariance
+    return None if P is None else (float(P[0, 0]), float(P[0, 1]), float(P[1, 1]), float(P[2, 2]))

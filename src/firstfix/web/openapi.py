@@ -1,90 +1,102 @@
-"""The API described for programs, from the tables that check what they send."""
+"""The OpenAPI 3.1 document. Its schemas come from the structs that decode and encode."""
 
 from __future__ import annotations
 
-from firstfix import __version__
-from firstfix.web.commands import POSE
-from firstfix.web.map_png import LEAST_PIXELS, MOST_PIXELS
-from firstfix.web.problem_details import MEDIA_TYPE
-from firstfix.web.request_body import JSON, NPZ
-from firstfix.web.schemas import Schema, entries, ref, schemas
+from typing import Any
 
-# What can be wrong with a body.
+import msgspec
+
+from firstfix import __version__
+from firstfix.web.commands import Pose
+from firstfix.web.locate_queue import Scan
+from firstfix.web.map_png import LEAST_PIXELS, MOST_PIXELS
+from firstfix.web.messages import Accepted, Answer, Map, Status
+from firstfix.web.problem_details import MEDIA_TYPE, Problem
+from firstfix.web.request_body import JSON, NPZ
+
+Schema = dict[str, Any]
+
+_STRUCTS = (Pose, Scan, Accepted, Answer, Map, Status, Problem)
+# Refusals of requests with a body.
 _BODY = (400, 408, 413, 415, 422)
 
 
 def document() -> Schema:
-    """Return the OpenAPI 3.1 document."""
+    """Return the document."""
+    template = "#/components/schemas/{name}"
+    _, schemas = msgspec.json.schema_components(_STRUCTS, ref_template=template)
     return {
         "openapi": "3.1.0",
         "info": {
             "title": "firstfix",
             "version": __version__,
-            "description": "Where is the robot? Metres, radians, seconds; poses are "
+            "description": "Where is the robot? Metres, radians, seconds. Poses are "
             "[x, y, yaw] of the robot's base in the map frame.",
             "license": {"name": "Apache-2.0", "identifier": "Apache-2.0"},
         },
         "servers": [{"url": "/"}],
         "paths": _paths(),
         "components": {
-            "schemas": schemas(),
+            "schemas": schemas,
             "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
         },
-        # None is needed unless the server was started with one.
+        # The token is needed only if the server was started with one.
         "security": [{}, {"token": []}],
     }
 
 
 def _paths() -> Schema:
-    pose_body = {JSON: {"schema": entries(POSE)}}
     scan_body = {
-        JSON: {"schema": ref("Scan")},
-        NPZ: {"schema": {"description": "an .npz file of arrays with the names of Scan"}},
+        JSON: {"schema": _ref(Scan)},
+        NPZ: {"schema": {"description": "an .npz file with the arrays of Scan"}},
     }
-    pixels = _query("max", "longer side, pixels; more than the most is the most")
+    pixels = _query("max", f"longer side, pixels; larger values mean {MOST_PIXELS}")
     pixels["schema"] = {"type": "integer", "minimum": LEAST_PIXELS, "maximum": 99999}
     pixels["schema"]["default"] = MOST_PIXELS
-    version = _query("v", "passed over: a new map has a new URL")
-    named = _query("map", "name of the map that is meant, where the body does not say it")
+    version = _query("v", "ignored; it changes with the map, so that caches do not keep old ones")
+    map_name = _query("map", "name of the expected map, if the body does not have it")
     return {
-        "/v1/status": {"get": _operation("Where the robot is, and why", "Status")},
-        "/v1/map": {"get": _operation("The map in use", "Map", 503)},
+        "/v1/status": {"get": _operation("State, pose, and why", _json(Status))},
+        "/v1/map": {"get": _operation("The map in use", _json(Map), 503)},
         "/v1/map.png": {
-            "get": {
-                **_operation("The map as an 8-bit grey PNG", None, 422, 503),
-                "parameters": [pixels, version],
-            }
+            "get": _operation("The map as an 8-bit grey PNG", {"image/png": {}}, 422, 503)
+            | {"parameters": [pixels, version]}
         },
         "/v1/locate": {
-            "post": {
-                **_operation("Find a scan in the map", "Answer", *_BODY, 404, 503),
-                "parameters": [named],
-                "requestBody": {"required": True, "content": scan_body},
-            }
+            "post": _operation("Search one scan in the map", _json(Answer), *_BODY, 404, 503)
+            | {"parameters": [map_name], "requestBody": {"required": True, "content": scan_body}}
         },
         "/v1/pose": {
-            "post": {
-                **_operation("A person says where the robot is", "Accepted", *_BODY, 403, 503),
-                "requestBody": {"required": True, "content": pose_body},
-            }
+            "post": _operation("Set a pose hint", _json(Accepted), *_BODY, 403, 503, success=202)
+            | {"requestBody": {"required": True, "content": _json(Pose)}}
         },
         "/v1/relocalize": {
-            "post": _operation("Forget, and search", "Accepted", 403, 503),
+            "post": _operation(
+                "Discard the pose and search", _json(Accepted), 403, 503, success=202
+            )
         },
-        "/openapi.json": {"get": _operation("This document", "Document")},
+        "/openapi.json": {
+            "get": _operation("This document", {JSON: {"schema": {"type": "object"}}})
+        },
     }
 
 
-def _operation(summary: str, answer: str | None, *refusals: int) -> Schema:
-    refused = {"content": {MEDIA_TYPE: {"schema": ref("Problem")}}}
-    content = {"image/png": {}} if answer is None else {JSON: {"schema": ref(answer)}}
-    done: Schema = {"description": summary, "content": content}
-    responses: Schema = {"202" if answer == "Accepted" else "200": done}
-    if answer is None:
-        responses["304"] = {"description": "as the client has it already"}
+def _operation(summary: str, content: Schema, *refusals: int, success: int = 200) -> Schema:
+    responses: Schema = {str(success): {"description": summary, "content": content}}
+    if "image/png" in content:
+        responses["304"] = {"description": "not modified"}
     for status in (*refusals, 401, 403, 421, 429):
-        responses[str(status)] = {"description": "refused, and why", **refused}
+        problem = {MEDIA_TYPE: {"schema": _ref(Problem)}}
+        responses[str(status)] = {"description": "refused, with the reason", "content": problem}
     return {"summary": summary, "responses": responses}
+
+
+def _json(struct: type) -> Schema:
+    return {JSON: {"schema": _ref(struct)}}
+
+
+def _ref(struct: type) -> Schema:
+    return {"$ref": f"#/components/schemas/{struct.__name__}"}
 
 
 def _query(name: str, description: str) -> Schema:

@@ -1,23 +1,24 @@
-"""What the page and the API of one robot are made of."""
+"""The parts behind the page and the API of one robot."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 from starlette.exceptions import HTTPException
 
 from firstfix.web.access_control import AccessPolicy
 from firstfix.web.command_executor import CommandExecutor
 from firstfix.web.map_png import MapPngCache
-from firstfix.web.messages import as_text, hello_message
+from firstfix.web.messages import Hello, Map, encode_text
 from firstfix.web.rate_limiter import RateLimiter
 from firstfix.web.snapshot import ActiveMap
 from firstfix.web.snapshot_store import SnapshotStore
 
+READ_ONLY = "This server is read-only. Restart it without --read-only to allow this."
 
-def _greet_nobody() -> None:
+
+def _do_nothing() -> None:
     """Do nothing."""
 
 
@@ -30,37 +31,39 @@ class Page:
     robot : str
         sim, ros1, ros2 or dds.
     store : SnapshotStore
-        What there is to be seen.
+        What is shown.
     executor : CommandExecutor
-        Carries out what people want.
+        Executes the commands of viewers.
     access : AccessPolicy
-        What is asked of clients.
-    greet : callable
-        Called when the first viewer comes.
-    allowance : RateLimiter
-        How much clients may still ask for.
-    pictures : MapPngCache
-        Of maps.
+        Who may see and who may steer.
+    on_first_viewer : callable
+        Called when the first viewer connects.
+    rate_limiter : RateLimiter
+        Limits the requests of each client.
+    map_pngs : MapPngCache
+        Encodes maps.
     """
 
     robot: str
     store: SnapshotStore
     executor: CommandExecutor
     access: AccessPolicy = field(default_factory=AccessPolicy)
-    greet: Callable[[], None] = _greet_nobody
-    allowance: RateLimiter = field(default_factory=RateLimiter)
-    pictures: MapPngCache = field(default_factory=MapPngCache)
+    on_first_viewer: Callable[[], None] = _do_nothing
+    rate_limiter: RateLimiter = field(default_factory=RateLimiter)
+    map_pngs: MapPngCache = field(default_factory=MapPngCache)
 
     def hello(self) -> str:
-        """Write the message that a viewer gets first."""
-        message: dict[str, Any] = hello_message(
-            self.robot,
-            self.executor.abilities,
-            self.store.snapshot.map,
-            self.store.events(),
-            may_steer=self.access.may_steer,
+        """Return the first message to a viewer."""
+        active_map = self.store.snapshot.map
+        return encode_text(
+            Hello(
+                robot=self.robot,
+                may_steer=self.access.may_steer,
+                abilities=self.executor.abilities,
+                map=None if active_map is None else Map.of(active_map),
+                events=self.store.events(),
+            )
         )
-        return as_text(message)
 
     def map(self) -> ActiveMap:
         """Return the map in use.
@@ -68,20 +71,20 @@ class Page:
         Raises
         ------
         HTTPException
-            503 if there is none yet.
+            503 while there is none.
         """
         active_map = self.store.snapshot.map
         if active_map is None:
-            raise HTTPException(503, "there is no map yet", {"retry-after": "1"})
+            raise HTTPException(503, "There is no map yet.", {"retry-after": "1"})
         return active_map
 
     def check_may_steer(self) -> None:
-        """Refuse those who may only watch.
+        """Refuse commands on a read-only server.
 
         Raises
         ------
         HTTPException
-            403 if that is so.
+            403 if it is read-only.
         """
         if not self.access.may_steer:
-            raise HTTPException(403, "the server was started with --read-only")
+            raise HTTPException(403, READ_ONLY)

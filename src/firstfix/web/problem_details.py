@@ -1,4 +1,4 @@
-"""How requests are refused: RFC 9457, in one sentence, and never with more than that."""
+"""Error responses: problem details of RFC 9457, in one plain sentence."""
 
 from __future__ import annotations
 
@@ -6,61 +6,66 @@ from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
 
+import msgspec
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import JSONResponse
+from starlette.responses import Response
 
 from firstfix.core.errors import InputError
-from firstfix.web.strict_json import NotJsonError
+from firstfix.web.json_decoding import NotJsonError
 
 MEDIA_TYPE = "application/problem+json"
 
 
-def problem(status: int, detail: str, headers: Mapping[str, str] | None = None) -> JSONResponse:
-    """Make the response that refuses.
+class Problem(msgspec.Struct, frozen=True):
+    """An error response."""
+
+    title: str
+    status: int
+    detail: str
+    type: str = "about:blank"
+
+
+def problem(status: int, detail: str, headers: Mapping[str, str] | None = None) -> Response:
+    """Make an error response.
 
     Parameters
     ----------
     status : int
-        Of HTTP.
+        HTTP status.
     detail : str
-        One sentence for people.
+        What is wrong and what to do, in one sentence.
     headers : mapping of str to str, optional
         Such as ``Retry-After``.
 
     Returns
     -------
-    JSONResponse
-        ``type``, ``title``, ``status``, ``detail``.
+    Response
+        The problem details as JSON.
     """
-    content = {
-        "type": "about:blank",
-        "title": HTTPStatus(status).phrase,
-        "status": status,
-        "detail": detail,
-    }
-    return JSONResponse(content, status, headers, MEDIA_TYPE)
+    content = Problem(HTTPStatus(status).phrase, status, detail)
+    return Response(msgspec.json.encode(content), status, headers, MEDIA_TYPE)
 
 
-async def _refused(_: Request, error: Exception) -> JSONResponse:
+async def _http_error(_: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)  # noqa: S101 - registered for nothing else
-    details = {404: "there is nothing here", 405: "another method is needed here"}
-    is_plain = error.detail == HTTPStatus(error.status_code).phrase
-    detail = details.get(error.status_code, error.detail) if is_plain else error.detail
+    details = {404: "There is nothing at this address.", 405: "This method is not allowed here."}
+    is_default = error.detail == HTTPStatus(error.status_code).phrase
+    detail = details.get(error.status_code, error.detail) if is_default else error.detail
     return problem(error.status_code, detail, error.headers)
 
 
-async def _not_usable(_: Request, error: Exception) -> JSONResponse:
+async def _input_error(_: Request, error: Exception) -> Response:
     return problem(400 if isinstance(error, NotJsonError) else 422, str(error))
 
 
-async def _own_error(_: Request, __: Exception) -> JSONResponse:
-    return problem(500, "an error of firstfix itself; its log has more")
+async def _internal_error(_: Request, __: Exception) -> Response:
+    return problem(500, "Internal error of firstfix. See its log.")
 
 
 HANDLERS: dict[Any, Any] = {
-    HTTPException: _refused,
-    InputError: _not_usable,
-    Exception: _own_error,
+    HTTPException: _http_error,
+    InputError: _input_error,
+    Exception: _internal_error,
 }
-"""For Starlette."""
+"""Exception handlers for Starlette."""

@@ -1,4 +1,4 @@
-"""Bodies of requests, read only as far as they may go."""
+"""Reading request bodies, with limits on type, size and time."""
 
 from __future__ import annotations
 
@@ -9,60 +9,49 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 
 MOST_BYTES = 4 * 2**20
-SLOWEST_S = 10.0
+TIMEOUT_S = 10.0
 
 JSON = "application/json"
 NPZ = "application/octet-stream"
 
 
-def kind_of(request: Request, *kinds: str) -> str:
-    """Return which of some media types a body has.
+def media_type(request: Request, *accepted: str) -> str:
+    """Return the media type of a body.
 
     Raises
     ------
     HTTPException
-        415 if it is another, or packed.
+        415 if it is not one of the accepted types, or if the body is compressed.
     """
     if request.headers.get("content-encoding", "identity") != "identity":
-        raise HTTPException(415, "send the body as it is, not packed")
+        raise HTTPException(415, "Send the body uncompressed.")
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if kind not in kinds:
-        raise HTTPException(415, f"send {' or '.join(kinds)}", {"accept": ", ".join(kinds)})
+    if kind not in accepted:
+        accept = {"accept": ", ".join(accepted)}
+        raise HTTPException(415, f"Send the body as {' or '.join(accepted)}.", accept)
     return kind
 
 
-async def body_of(request: Request, most_bytes: int = MOST_BYTES) -> bytes:
-    """Read a body.
-
-    Parameters
-    ----------
-    request : Request
-        Whose.
-    most_bytes : int
-        How long it may be.
-
-    Returns
-    -------
-    bytes
-        All of it.
+async def read_body(request: Request, most_bytes: int = MOST_BYTES) -> bytes:
+    """Read a body of at most so many bytes.
 
     Raises
     ------
     HTTPException
-        413 if it is longer, 408 if it takes too long to come, 400 if it breaks off.
+        413 if it is longer, 408 if it takes too long, 400 if it is incomplete.
     """
-    told = request.headers.get("content-length", "0")
-    if told.isdecimal() and int(told[:20]) > most_bytes:
+    announced = request.headers.get("content-length", "0")
+    if announced.isdecimal() and int(announced[:20]) > most_bytes:
         _too_long(most_bytes)
     try:
-        return await asyncio.wait_for(_all_of(request, most_bytes), SLOWEST_S)
+        return await asyncio.wait_for(_read(request, most_bytes), TIMEOUT_S)
     except asyncio.TimeoutError:
-        raise HTTPException(408, f"the body took more than {SLOWEST_S:g} s") from None
+        raise HTTPException(408, f"The body took more than {TIMEOUT_S:g} s.") from None
     except ClientDisconnect:
-        raise HTTPException(400, "the body broke off") from None
+        raise HTTPException(400, "The body is incomplete.") from None
 
 
-async def _all_of(request: Request, most_bytes: int) -> bytes:
+async def _read(request: Request, most_bytes: int) -> bytes:
     parts, length = [], 0
     async for part in request.stream():
         length += len(part)
@@ -73,4 +62,5 @@ async def _all_of(request: Request, most_bytes: int) -> bytes:
 
 
 def _too_long(most_bytes: int) -> NoReturn:
-    raise HTTPException(413, f"a body has at most {most_bytes} bytes", {"connection": "close"})
+    detail = f"The body is too long. The limit is {most_bytes} bytes."
+    raise HTTPException(413, detail, {"connection": "close"})

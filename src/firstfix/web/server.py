@@ -1,4 +1,4 @@
-"""The server: what is served where, and uvicorn under it."""
+"""The server: the ASGI application and uvicorn."""
 
 from __future__ import annotations
 
@@ -25,69 +25,68 @@ from firstfix.web.api import Api
 from firstfix.web.broadcaster import Broadcaster
 from firstfix.web.page import Page
 from firstfix.web.problem_details import HANDLERS
-from firstfix.web.websocket import live
+from firstfix.web.websocket import serve_viewer
 
 STATIC = Path(__file__).parent / "static"
 
-# Connections at once: twenty viewers, what else they fetch, and some programs.
+# Twenty viewers, their other requests, and some programs.
 _MOST_CONNECTIONS = 128
-# An order is short.
 _MESSAGE_BYTES = 16 * 1024
-_LAST_WORDS_S = 2
-# A viewer who takes nothing for so long is gone, whatever its network still says.
+_SHUTDOWN_S = 2
+# A connection whose peer acknowledges nothing for this long is closed.
 _SILENT_MS = 60_000
-# What waits in the system for a slow viewer is old when it comes: half a second of frames at most.
+# Frames in the kernel's buffer are stale when a slow viewer receives them: half a second at most.
 _SEND_BUFFER = 128 * 1024
 
 
 def make_app(page: Page) -> ASGIApp:
-    """Put a page together.
+    """Make the ASGI application of a page.
 
     Parameters
     ----------
     page : Page
-        What it is about.
+        What it serves.
 
     Returns
     -------
     ASGI application
-        For `run`, or another server.
+        For uvicorn or another server.
     """
-    broadcaster = Broadcaster(page.store, page.hello, page.greet)
+    broadcaster = Broadcaster(page.store, page.hello, page.on_first_viewer)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        showing = asyncio.create_task(broadcaster.run())
+        broadcasting = asyncio.create_task(broadcaster.run())
         yield
-        showing.cancel()
+        broadcasting.cancel()
         with contextlib.suppress(asyncio.CancelledError):
-            await showing
+            await broadcasting
 
     async def index(_: Request) -> Response:
         return FileResponse(STATIC / "index.html", headers={"cache-control": "no-cache"})
 
-    async def watch(websocket: WebSocket) -> None:
-        await live(websocket, broadcaster, page)
+    async def viewer(websocket: WebSocket) -> None:
+        await serve_viewer(websocket, broadcaster, page)
 
     routes = [
         Route("/", index),
         *Api(page, broadcaster).routes(),
-        WebSocketRoute("/v1/live", watch),
+        WebSocketRoute("/v1/live", viewer),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
     app = Starlette(routes=routes, lifespan=lifespan, exception_handlers=HANDLERS)
-    return AccessControl(app, page.access, page.allowance)
+    return AccessControl(app, page.access, page.rate_limiter)
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Open the port of the server, before anything else is begun.
+    """Open the port of the server.
 
     Parameters
     ----------
     host : str
-        Name or address of this machine, as others shall reach it.
+        Name or address of this machine.
     port : int
-        0 for any that is free.
+        0 for any free port.
 
     Returns
     -------
@@ -97,19 +96,18 @@ def listen(host: str, port: int) -> socket.socket:
     Raises
     ------
     InputError
-        If that cannot be.
+        If the port cannot be opened.
     """
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         listening = socket.create_server(address[:2], family=family)
     except OSError as error:
         raise InputError(
-            expected=f"port {port} of {host}, free and of this machine",
-            received=_why(error),
-            remedy="choose another --port or --host, or end what listens there",
+            f"Cannot listen on port {port} of {host}: {_why(error)}. Choose another --port or "
+            "--host, or stop the program that uses it."
         ) from error
-    # Connections inherit these. asyncio sets the first only where it recognises the socket as TCP,
-    # which this one does not say; without it every answer waits 40 ms for an acknowledgement.
+    # Connections inherit these options. asyncio sets TCP_NODELAY only on sockets that name TCP as
+    # their protocol, and this one does not; without it each response waits 40 ms.
     listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
     if hasattr(socket, "TCP_USER_TIMEOUT"):
@@ -118,14 +116,14 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def _why(error: OSError) -> str:
-    """Return what the system says, without what Python adds to it."""
+    """Return the message of the operating system."""
     if isinstance(error, socket.gaierror) or not error.errno:
         return f"{error.strerror or error}"
     return os.strerror(error.errno)
 
 
 def url_of(listening: socket.socket) -> str:
-    """Return where a browser finds the page."""
+    """Return the URL of the page."""
     host, port = listening.getsockname()[:2]
     if ipaddress.ip_address(host).is_unspecified:  # all addresses of this machine
         host = socket.gethostname()
@@ -138,7 +136,7 @@ def make_server(page: Page) -> uvicorn.Server:
     Parameters
     ----------
     page : Page
-        What is served.
+        What it serves.
 
     Returns
     -------
@@ -147,20 +145,19 @@ def make_server(page: Page) -> uvicorn.Server:
     """
     config = uvicorn.Config(
         make_app(page),
-        # Not every request: what was asked for is nobody's business.
         access_log=False,
         log_level="warning",
-        # Those of the program around it stay as they are: setting up others would close them.
+        # uvicorn's own configuration would close the log handlers of the program.
         log_config=None,
         http="h11",
         limit_concurrency=_MOST_CONNECTIONS,
-        # Anybody can write them: a proxy that is to be believed would have to be named.
+        # Any client can forge these headers.
         proxy_headers=False,
         server_header=False,
-        timeout_graceful_shutdown=_LAST_WORDS_S,
+        timeout_graceful_shutdown=_SHUTDOWN_S,
         ws="websockets-sansio",
         ws_max_size=_MESSAGE_BYTES,
-        # Floats do not get shorter, and each viewer would cost as much again.
+        # Floats hardly compress, and each viewer would be compressed for separately.
         ws_per_message_deflate=False,
     )
     return uvicorn.Server(config)

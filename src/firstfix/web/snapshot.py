@@ -1,4 +1,4 @@
-"""What viewers may see at one moment."""
+"""What the page shows at one moment."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ActiveMap:
     name : str
         Its name, for people and requests.
     key : str
-        What tells it from others.
+        Hash of its content.
     grid : OccupancyGrid
         The map.
     matcher : ScanMatcher
@@ -41,7 +41,7 @@ class ActiveMap:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RegisteredScan:
-    """A scan where it was believed to be taken."""
+    """A scan and the pose at which it is drawn."""
 
     scan: LaserScan
     T_map_base: SE2
@@ -49,7 +49,7 @@ class RegisteredScan:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ParticleCloud:
-    """A belief, and the pose that was taken from it when it was new."""
+    """Particles of the filter, and its pose estimate when they were last updated."""
 
     particles: Particles
     T_map_base: SE2
@@ -57,40 +57,44 @@ class ParticleCloud:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Snapshot:
-    """All that changes from scan to scan; frozen, so that any thread may read it.
+    """Everything that changes from scan to scan. Frozen, so that any thread may read it.
 
     Parameters
     ----------
     map : ActiveMap or None
         The map in use.
     stamp : float
-        Time of the newest input that led to something, s.
+        Time of the last input with an output, s.
     state : State
         The state.
     reason : str
         Why, in words.
     pose : SE2 or None
-        ``T_map_base``, while there is one belief.
+        ``T_map_base`` while the robot is localized.
     covariance : ndarray, shape (3, 3), or None
-        Of it.
+        Of x (m), y (m), yaw (rad) in the map frame.
     hypotheses : tuple of Hypothesis
-        While there are several.
+        The places that fit, while there are several.
+    rivals : int
+        Places that fit about equally well, the best or published one included.
+    chosen_by : str or None
+        Source of the hint that chose the pose, until the evidence decides.
     evidence : Evidence or None
         How the scan agrees with the map.
     motion : MotionRequest or None
-        What would decide between the hypotheses.
+        The motion that would decide between the hypotheses.
     scan : RegisteredScan or None
-        The newest scan that was believed to be somewhere.
+        The last scan with a pose.
     particles : ParticleCloud or None
-        The particles.
+        The particles of the filter.
     cpu_ms : float or None
         Processor time for a scan, median of the last ones, ms.
     time_to_fix_s : float or None
-        Of the last search that found the robot.
+        Duration of the last successful search, s.
     truth : SE2 or None
         ``T_map_base`` of a simulated robot.
     paused : bool
-        True while its clock stands still.
+        True while the simulated clock is stopped.
     """
 
     map: ActiveMap | None = None
@@ -100,6 +104,8 @@ class Snapshot:
     pose: SE2 | None = None
     covariance: NDArray[np.float64] | None = None
     hypotheses: tuple[Hypothesis, ...] = ()
+    rivals: int = 0
+    chosen_by: str | None = None
     evidence: Evidence | None = None
     motion: MotionRequest | None = None
     scan: RegisteredScan | None = None

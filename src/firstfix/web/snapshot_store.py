@@ -1,4 +1,4 @@
-"""What goes on, kept for viewers: filled by the thread that thinks, read by the one that serves."""
+"""The newest snapshot: written by the localizer's thread, read by the server's."""
 
 from __future__ import annotations
 
@@ -19,25 +19,26 @@ from firstfix.web.snapshot import ActiveMap, ParticleCloud, RegisteredScan, Snap
 from firstfix.web.timeline import Event, Timeline
 from firstfix.web.timing import TimingStatistics
 
-# Scans that wait for odometry of their stamp.
+# Scans kept until the localizer has used them: they wait for odometry.
 _MOST_SCANS = 40
 
 
 class SnapshotStore:
-    """A watcher of a node: holds what viewers may see, whether there are any or not.
+    """Observer of a node: holds the newest snapshot and the timeline.
 
-    It takes down references and some figures: what viewers cost is paid where they are served.
+    It only stores references. Frames for viewers are encoded by the server's thread.
 
     Parameters
     ----------
     map_name : str
-        What the map is called.
+        Name of the map.
     """
 
     def __init__(self, map_name: str) -> None:
         self._lock = threading.Lock()
         self._snapshot = Snapshot()
-        self._map_name = map_name
+        # A file name may have bytes that are not UTF-8, and JSON cannot have them.
+        self._map_name = map_name.encode(errors="replace").decode()
         self._timeline = Timeline()
         self._timing = TimingStatistics()
         self._scans: deque[LaserScan] = deque(maxlen=_MOST_SCANS)
@@ -45,7 +46,7 @@ class SnapshotStore:
 
     @property
     def snapshot(self) -> Snapshot:
-        """What there is to see now."""
+        """The newest snapshot."""
         return self._snapshot
 
     def events(self, since: int = 0) -> list[Event]:
@@ -54,55 +55,54 @@ class SnapshotStore:
             return self._timeline.since(since)
 
     def subscribe(self, changed: Callable[[], None]) -> None:
-        """Call back, from any thread, whenever there is something new."""
+        """Call a function, from any thread, after each change."""
         self._listeners.append(changed)
 
     def unsubscribe(self, changed: Callable[[], None]) -> None:
-        """Call back no more."""
+        """Stop calling a function."""
         self._listeners.remove(changed)
 
     def add_event(self, kind: str, text: str) -> None:
-        """Note an event that the localizer does not know of."""
+        """Add an event to the timeline."""
         with self._lock:
-            self._timeline.note(self._snapshot.stamp, kind, text)
-        self._call_back()
+            self._timeline.add(self._snapshot.stamp, kind, text)
+        self._notify()
 
     def set_truth(self, truth: SE2) -> None:
-        """Take down where a simulated robot truly is; its scan comes right after."""
+        """Set the true pose of a simulated robot, before its scan."""
         with self._lock:
             self._snapshot = replace(self._snapshot, truth=truth)
 
     def set_paused(self, *, paused: bool) -> None:
-        """Take down whether the clock of a simulated robot stands still."""
+        """Set whether the simulated clock is stopped."""
         with self._lock:
             self._snapshot = replace(self._snapshot, paused=paused)
-        self._call_back()
+        self._notify()
 
     def __call__(self, given: Input, outputs: list[Output], localizer: Localizer) -> None:
-        """Take down what came in and what it led to; called by the thread that thinks."""
-        self._timing.count(given, outputs, self._snapshot.state)
+        """Store the outputs for an input; called by the localizer's thread."""
+        self._timing.end_input(given, outputs, self._snapshot.state)
         with self._lock:
             if isinstance(given, LaserScan):
                 self._scans.append(given)
                 self._snapshot = replace(self._snapshot, stamp=given.stamp)
-            self._timeline.note_input(given)
+            self._timeline.add_input(given)
             if isinstance(given, NewMap):
-                self._take_map(given, localizer)
+                self._store_map(given, localizer)
             for output in outputs:
-                self._timeline.note_output(given, output)
-                self._take(output, localizer)
+                self._timeline.add_output(given, output)
+                self._store_output(output, localizer)
         if outputs or isinstance(given, LaserScan):
-            self._call_back()
-        self._timing.leave()
+            self._notify()
+        self._timing.start_input()
 
-    def _take_map(self, given: NewMap, localizer: Localizer) -> None:
+    def _store_map(self, given: NewMap, localizer: Localizer) -> None:
         if localizer.matcher is not None:
             key = map_key(given.grid)
             active_map = ActiveMap(self._map_name, key, given.grid, localizer.matcher)
             self._snapshot = replace(self._snapshot, map=active_map)
 
-    def _take(self, output: Output, localizer: Localizer) -> None:
-        """Put one output into the snapshot."""
+    def _store_output(self, output: Output, localizer: Localizer) -> None:
         if isinstance(output, TrackedPose):
             self._snapshot = replace(
                 self._snapshot,
@@ -121,9 +121,9 @@ class SnapshotStore:
         elif isinstance(output, MotionRequest):
             self._snapshot = replace(self._snapshot, motion=output)
         elif isinstance(output, Status):
-            self._take_status(output)
+            self._store_status(output)
 
-    def _take_status(self, status: Status) -> None:
+    def _store_status(self, status: Status) -> None:
         cleared: dict[str, Any] = {}
         if status.state is not State.LOCALIZED:
             cleared = {"pose": None, "covariance": None, "particles": None}
@@ -134,6 +134,8 @@ class SnapshotStore:
             stamp=status.stamp,
             state=status.state,
             reason=status.reason,
+            rivals=status.rivals,
+            chosen_by=status.chosen_by,
             evidence=status.evidence,
             cpu_ms=self._timing.cpu_ms,
             time_to_fix_s=self._timing.time_to_fix_s,
@@ -152,6 +154,6 @@ class SnapshotStore:
         scan = next((scan for scan in reversed(self._scans) if scan.stamp == stamp), None)
         return RegisteredScan(scan, T_map_base) if scan is not None else self._snapshot.scan
 
-    def _call_back(self) -> None:
+    def _notify(self) -> None:
         for changed in tuple(self._listeners):
             changed()

@@ -1,4 +1,4 @@
-"""What the localizer takes: processor time for a scan, and time until it has found the robot."""
+"""Processor time per scan, and the time to the first fix."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SCANS = 50
 
 
 class TimingStatistics:
-    """Measures the thread that calls it, between one input and the next."""
+    """Measures the localizer's thread, which must make all calls."""
 
     def __init__(self) -> None:
         self.time_to_fix_s: float | None = None
@@ -26,11 +26,11 @@ class TimingStatistics:
 
     @property
     def cpu_ms(self) -> float | None:
-        """Processor time for a scan and what came with it, median of the last ones, ms."""
+        """Processor time per scan, with the inputs before it: median of the last scans, ms."""
         return 1e3 * statistics.median(self._cpu_s) if self._cpu_s else None
 
-    def count(self, given: Input, outputs: list[Output], state: State) -> None:
-        """Take down what an input took, and what came of it; ``state`` is that before it."""
+    def end_input(self, given: Input, outputs: list[Output], state: State) -> None:
+        """Count an input and its outputs; ``state`` is the state before it."""
         self._spent_s += time.thread_time() - self._left_at_s
         if state in {State.LOCALIZED, State.NO_MAP, State.LIFTED}:
             self._began = None
@@ -38,7 +38,7 @@ class TimingStatistics:
             self._began = given.stamp
         for output in outputs:
             if isinstance(output, InitialPose) and self._began is not None:
-                # From the first scan to the one that settled it, and what that took to look at.
+                # From the first scan to the scan of the fix, and the processor time since then.
                 self.time_to_fix_s = output.stamp - self._began + self._spent_s
                 self._began = None
         if isinstance(given, LaserScan):
@@ -46,6 +46,6 @@ class TimingStatistics:
         if isinstance(given, LaserScan | NewMap):
             self._spent_s = 0.0
 
-    def leave(self) -> None:
-        """Say that what the thread does from here to the next input is its work."""
+    def start_input(self) -> None:
+        """Start the measurement of the next input."""
         self._left_at_s = time.thread_time()

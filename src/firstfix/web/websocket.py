@@ -1,4 +1,4 @@
-"""One WebSocket for each viewer."""
+"""``WS /v1/live``: one connection per viewer."""
 
 from __future__ import annotations
 
@@ -10,45 +10,45 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from firstfix.core.errors import InputError
 from firstfix.web.access_control import AccessPolicy, client_of
 from firstfix.web.broadcaster import Broadcaster, Viewer
-from firstfix.web.commands import decode_command
-from firstfix.web.page import Page
+from firstfix.web.commands import ClientMessage, Token
+from firstfix.web.json_decoding import decode
+from firstfix.web.page import READ_ONLY, Page
 from firstfix.web.rate_limiter import WRONG_TOKEN, RateLimiter
-from firstfix.web.strict_json import parsed
 
-# Codes by which the server ends a connection.
+# Close codes.
 _NO_TOKEN = 4401
 _TOO_MANY = 1013
-_TOKEN_S = 5.0
+_TOKEN_TIMEOUT_S = 5.0
 
-# Messages of one viewer; a hand on a slider makes thirty a second.
-_ORDERS_HZ = 30.0
-_ORDERS_AT_ONCE = 60.0
+# Commands of one viewer. Moving a slider sends thirty a second.
+_COMMANDS_HZ = 30.0
+_COMMAND_BURST = 60.0
 
 
-async def live(socket: WebSocket, broadcaster: Broadcaster, page: Page) -> None:
-    """Serve a viewer until it goes.
+async def serve_viewer(socket: WebSocket, broadcaster: Broadcaster, page: Page) -> None:
+    """Serve a viewer until it disconnects.
 
     Parameters
     ----------
     socket : WebSocket
-        Of the viewer.
+        The connection.
     broadcaster : Broadcaster
-        Who else looks on.
+        The other viewers.
     page : Page
-        What there is to be seen, and who may see it.
+        What is shown, and who may see it.
     """
     await socket.accept()
-    if not await _knows_token(socket, page.access):
-        page.allowance.charge(client_of(socket.scope), WRONG_TOKEN)
-        await socket.close(_NO_TOKEN, "a token is needed")
+    if not await _is_authenticated(socket, page.access):
+        page.rate_limiter.charge(client_of(socket.scope), WRONG_TOKEN)
+        await socket.close(_NO_TOKEN, "A token is needed.")
         return
     viewer = broadcaster.join()
     if viewer is None:
-        await socket.close(_TOO_MANY, "too many viewers")
+        await socket.close(_TOO_MANY, "There are too many viewers.")
         return
     sending = asyncio.create_task(_send(socket, viewer))
     try:
-        await _take_orders(socket, viewer, page)
+        await _receive_commands(socket, viewer, page)
     finally:
         broadcaster.leave(viewer)
         sending.cancel()
@@ -56,16 +56,15 @@ async def live(socket: WebSocket, broadcaster: Broadcaster, page: Page) -> None:
             await sending
 
 
-async def _knows_token(socket: WebSocket, access: AccessPolicy) -> bool:
+async def _is_authenticated(socket: WebSocket, access: AccessPolicy) -> bool:
     if access.token is None:
         return True
     try:
-        text = await asyncio.wait_for(_next_text(socket), _TOKEN_S)
-        message = parsed(text or "")
+        text = await asyncio.wait_for(_next_text(socket), _TOKEN_TIMEOUT_S)
+        message: Token = decode(text or "", Token)
     except (asyncio.TimeoutError, InputError):
         return False
-    token = message.get("token") if isinstance(message, dict) else None
-    return isinstance(token, str) and access.knows(token)
+    return access.accepts(message.token)
 
 
 async def _send(socket: WebSocket, viewer: Viewer) -> None:
@@ -77,38 +76,29 @@ async def _send(socket: WebSocket, viewer: Viewer) -> None:
                 await socket.send_bytes(frame)
 
 
-async def _take_orders(socket: WebSocket, viewer: Viewer, page: Page) -> None:
-    allowance = RateLimiter(_ORDERS_HZ, _ORDERS_AT_ONCE)
+async def _receive_commands(socket: WebSocket, viewer: Viewer, page: Page) -> None:
+    rate_limiter = RateLimiter(_COMMANDS_HZ, _COMMAND_BURST)
     while (text := await _next_text(socket)) is not None:
-        if allowance.takes(""):
-            await _take_order(text, viewer, page)
-        else:
-            viewer.refuse("too many messages: this one was passed over")
+        if not rate_limiter.admits(""):
+            viewer.refuse("Too many commands. This one was ignored.")
+            continue
+        try:
+            await _execute(decode(text, ClientMessage), page)
+        except InputError as error:
+            viewer.refuse(str(error))
 
 
-async def _take_order(text: str, viewer: Viewer, page: Page) -> None:
-    try:
-        await _execute(parsed(text), page)
-    except InputError as error:
-        viewer.refuse(str(error))
-
-
-async def _execute(message: object, page: Page) -> None:
-    if isinstance(message, dict) and message.get("type") == "token":
-        return  # welcome, though none is needed
-    order = decode_command(message)
+async def _execute(message: ClientMessage, page: Page) -> None:
+    if isinstance(message, Token):
+        return  # allowed where none is needed
     if not page.access.may_steer:
-        raise InputError(
-            expected="viewers who watch",
-            received=f"one who wants to steer ({order.kind})",
-            remedy="start firstfix without --read-only",
-        )
-    # Planning a way through a large building takes a while.
-    await asyncio.to_thread(page.executor.execute, order)
+        raise InputError(READ_ONLY)
+    # Planning a path through a large building takes a while.
+    await asyncio.to_thread(page.executor.execute, message)
 
 
 async def _next_text(socket: WebSocket) -> str | None:
-    """Wait for a message; None if the viewer has gone."""
+    """Wait for a message; None if the viewer has disconnected."""
     message = await socket.receive()
     if message["type"] == "websocket.disconnect":
         return None

@@ -71,7 +71,7 @@ def test_what_is_given_is_taken_at_once_also_while_the_robot_is_paused():
         hint = PoseHint(0.0, SE2(1.0, 1.0, 0.0))
         node.give(hint)
         until(lambda: hint in diary.given)
-        assert diary.state is State.DISAMBIGUATING
+        assert diary.state is State.VERIFYING_HINT
         robot.go_on()
         until(lambda: diary.state is State.LOCALIZED)
 

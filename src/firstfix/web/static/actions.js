@@ -123,9 +123,9 @@ export class Actions {
     this.onChange();
   }
 
-  pick(index) {
+  pick(id) {
     if (!this.#maySteer) return;
-    this.#send({ type: "pick", index });
+    this.#send({ type: "pick", id });
     this.leaveMode();
   }
 

@@ -19,7 +19,7 @@ export class Gestures {
    * @param {HTMLElement} surface
    * @param {View} view
    * @param {Scene} scene
-   * @param {object} on onViewed() after each move of the map by hand; onDraft(), onSet(), onPick(index), onNoPull(),
+   * @param {object} on onViewed() after each move of the map by hand; onDraft(), onSet(), onPick(id), onNoPull(),
    *     onHover(x, y), onLongPress(): boolean
    */
   constructor(surface, view, scene, on) {
@@ -55,7 +55,7 @@ export class Gestures {
   }
 
   #press(at) {
-    if (this.#pulled || ghostAt(this.view, this.scene.ghosts, ...at) >= 0) return;
+    if (this.#pulled || ghostAt(this.view, this.scene.ghosts, ...at) !== null) return;
     if (this.on.onLongPress()) this.#begin(at);
   }
 
@@ -143,13 +143,13 @@ export class Gestures {
     }
     this.#drop();
     const ghost = ghostAt(this.view, this.scene.ghosts, ...at);
-    if (ghost >= 0) this.on.onPick(ghost);
+    if (ghost !== null) this.on.onPick(ghost);
     else this.on.onNoPull();
   }
 
   #click(at) {
     const ghost = ghostAt(this.view, this.scene.ghosts, ...at);
-    if (ghost >= 0) this.on.onPick(ghost);
+    if (ghost !== null) this.on.onPick(ghost);
   }
 
   #drop() {

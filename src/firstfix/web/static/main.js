@@ -45,7 +45,7 @@ const connection = new Connection({
 });
 const actions = new Actions(connection, scene, view, notices, redraw);
 const panel = new Panel({
-  onPick: (index) => actions.pick(index),
+  onPick: (id) => actions.pick(id),
   onMark: mark,
   onNewState: (text) => notices.speak(text),
 });
@@ -118,16 +118,16 @@ function beforeFrame(now) {
   app.dataset.view = numbers([view.scale, view.x, view.y, ...view.middle]);
 }
 
-function mark(index) {
-  if (scene.marked === index) return;
-  scene.marked = index;
+function mark(id) {
+  if (scene.marked === id) return;
+  scene.marked = id;
   redraw();
 }
 
-function hover(place, ghost = -1) {
+function hover(place, ghost = null) {
   byId("cursor-text").textContent = place ? `${metres(place[0])}, ${metres(place[1])}` : "";
   mark(ghost);
-  app.dataset.over = ghost >= 0 && actions.maySteer ? "ghost" : "";
+  app.dataset.over = ghost !== null && actions.maySteer ? "ghost" : "";
 }
 
 /** For tests and for the curious: what is shown, readable from outside. */
@@ -142,7 +142,7 @@ new Gestures(byId("overlay"), view, scene, {
   onHover: hover,
   onDraft: redraw,
   onSet: () => actions.set(),
-  onPick: (index) => actions.pick(index),
+  onPick: (id) => actions.pick(id),
   onNoPull: () => actions.needsPull(),
   onLongPress: () => actions.enterPoseMode(),
 });

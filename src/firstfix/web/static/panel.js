@@ -19,7 +19,7 @@ export class Panel {
   #heardAt = 0;
 
   /**
-   * @param {object} on onPick(index), onMark(index), onNewState(text for a screen reader)
+   * @param {object} on onPick(id), onMark(id), onNewState(text for a screen reader)
    */
   constructor(on) {
     this.on = on;
@@ -80,9 +80,11 @@ export class Panel {
     byId("places").hidden = places.length === 0;
     const list = byId("places-list");
     while (list.children.length > places.length) list.lastElementChild.remove();
-    while (list.children.length < places.length) list.append(this.#newPlace(list.children.length));
+    while (list.children.length < places.length) list.append(this.#newPlace());
     places.forEach((place, i) => {
-      const [number, chance, where] = list.children[i].firstElementChild.children;
+      const button = list.children[i].firstElementChild;
+      button.dataset.id = place.id;
+      const [number, chance, where] = button.children;
       setText(number, String(i + 1));
       setText(chance, words.percent(place.probability));
       const fits = place.explained == null ? "" : `${words.percent(place.explained)} of the beams fit`;
@@ -91,7 +93,7 @@ export class Panel {
     });
   }
 
-  #newPlace(index) {
+  #newPlace() {
     const item = document.createElement("li");
     const button = document.createElement("button");
     button.type = "button";
@@ -99,12 +101,14 @@ export class Panel {
     const where = child("span", "where");
     where.append(child("span", ""), child("small", ""));
     button.append(child("span", "number"), child("b", ""), where);
-    button.addEventListener("click", () => this.on.onPick(index));
+    // The id of the place that is shown, also if the list has changed since.
+    const id = () => Number(button.dataset.id);
+    button.addEventListener("click", () => this.on.onPick(id()));
     for (const event of ["focus", "pointerenter"]) {
-      button.addEventListener(event, () => this.on.onMark(index));
+      button.addEventListener(event, () => this.on.onMark(id()));
     }
     for (const event of ["blur", "pointerleave"]) {
-      button.addEventListener(event, () => this.on.onMark(-1));
+      button.addEventListener(event, () => this.on.onMark(null));
     }
     item.append(button);
     return item;

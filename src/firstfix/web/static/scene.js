@@ -12,7 +12,7 @@ export class Scene {
     this.mode = "look";
     this.draft = null; // {kind, x, y, yaw}: what a person is about to say
     this.goal = null; // [x, y] where the robot was last sent
-    this.marked = -1; // the ghost under the pointer or the focus
+    this.marked = null; // id of the ghost under the pointer or the focus
     this.shown = { scan: true, particles: true, trail: true, truth: true };
   }
 
@@ -22,7 +22,7 @@ export class Scene {
     this.particles = null;
     this.trail = [];
     this.goal = null;
-    this.marked = -1;
+    this.marked = null;
   }
 
   /** Several places, of which a person may choose one; none once the robot is found. */

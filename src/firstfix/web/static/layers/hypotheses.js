@@ -10,7 +10,7 @@ const HOPELESS = 0.01; // below this a ghost is small and says no number, unless
 export function drawHypotheses(ctx, view, ghosts, marked, colours) {
   // The most likely last, so that it lies on top.
   for (let i = ghosts.length - 1; i >= 0; i--) {
-    drawGhost(ctx, view, ghosts[i], i, i === marked, colours);
+    drawGhost(ctx, view, ghosts[i], i, ghosts[i].id === marked, colours);
   }
 }
 
@@ -84,14 +84,14 @@ function drawLabel(ctx, text, radius, yaw, colours) {
   ctx.fillText(text, 0, y);
 }
 
-/** The ghost at a point of the window, or -1. */
+/** The id of the ghost at a point of the window, or null. */
 export function ghostAt(view, ghosts, px, py) {
   const reach = Math.max(robotRadius(view), LEAST_TARGET_PX);
-  let [best, nearest] = [-1, reach];
-  ghosts.forEach(({ pose }, i) => {
+  let [best, nearest] = [null, reach];
+  for (const { id, pose } of ghosts) {
     const [x, y] = view.toScreen(pose[0], pose[1]);
     const distance = Math.hypot(px - x, py - y);
-    if (distance < nearest) [best, nearest] = [i, distance];
-  });
+    if (distance < nearest) [best, nearest] = [id, distance];
+  }
   return best;
 }
