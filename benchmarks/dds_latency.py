@@ -37,10 +37,10 @@ from firstfix.ros.channels import (
     AMCL_POSE,
     INITIAL_POSE,
     TF,
+    Channel,
     Delivery,
-    Heard,
     Topic,
-    heard_topics,
+    subscribed_topics,
 )
 from firstfix.ros.dds.endpoints import Receiver, Sender, Watch
 from firstfix.ros.dds.types import decode, make
@@ -57,7 +57,7 @@ DOMAIN = 1 + os.getpid() % 100
 
 SPEED_M_S, RADIUS_M, CLEARANCE_M = 0.5, 1.0, 1.5
 ODOM, BASE, LASER = "odom", "base_footprint", "laser"
-HEARD = heard_topics(NodeConfig())
+HEARD = subscribed_topics(NodeConfig())
 CLOUD = Topic("particle_cloud", "nav2_msgs/ParticleCloud", Delivery.SENSOR)
 
 
@@ -90,8 +90,9 @@ class Robot:
         self.period_s = 1.0 / rate
         self._domain = Domain(DOMAIN, LOOPBACK)
         self.participant = DomainParticipant(DOMAIN)
-        self.senders = {h: self._sender(HEARD[h]) for h in (Heard.SCAN, Heard.TF, Heard.KIDNAPPED)}
-        self.fixed = [self._sender(HEARD[Heard.TF_STATIC]), self._sender(HEARD[Heard.MAP])]
+        sent = (Channel.SCAN, Channel.TF, Channel.KIDNAPPED)
+        self.senders = {channel: self._sender(HEARD[channel]) for channel in sent}
+        self.fixed = [self._sender(HEARD[Channel.TF_STATIC]), self._sender(HEARD[Channel.MAP])]
         self.fixed[0].send(transforms(make, 0.0, BASE, LASER, SE2.identity()))
         self.fixed[1].send(occupancy_grid(make, 0.0, "map", grid))
 
@@ -101,14 +102,14 @@ class Robot:
         index %= len(self.poses)
         tf = transforms(make, stamp, ODOM, BASE, self.poses[index])
         message = laser_scan(make, LASER, stamped(self.scans[index], stamp))
-        self.senders[Heard.TF].send(tf)
-        self.senders[Heard.SCAN].send(message)
+        self.senders[Channel.TF].send(tf)
+        self.senders[Channel.SCAN].send(message)
         return stamp
 
     def kidnap(self) -> None:
         """Be lifted and put down where it was."""
         for value in (True, False):
-            self.senders[Heard.KIDNAPPED].send(make("std_msgs/Bool", data=value))
+            self.senders[Channel.KIDNAPPED].send(make("std_msgs/Bool", data=value))
 
     def _sender(self, topic: Topic) -> Sender:
         return Sender(self.participant, topic, dds_name(topic))

@@ -37,7 +37,6 @@ from firstfix.io.logs.tum import load_trajectory
 from firstfix.io.maps import image
 from firstfix.io.maps.check import check_map
 from firstfix.io.maps.map_server import load_map, save_map
-from firstfix.io.parameters.amcl_yaml import load_amcl_config
 from firstfix.io.ros_messages.incoming import (
     to_grid,
     to_laser_scan,
@@ -48,6 +47,7 @@ from firstfix.io.ros_messages.incoming import (
 )
 from firstfix.io.saved_pose import SavedPose, load_pose, save_pose
 from firstfix.ros.arguments import settings_from
+from firstfix.ros.parameters import load_node_config
 from firstfix.web.commands import ClientMessage
 from firstfix.web.json_decoding import decode
 from firstfix.web.locate_queue import LocateQueue
@@ -118,7 +118,7 @@ def read_bag_message(data: bytes, folder: Path) -> None:
 def read_parameters(data: bytes, folder: Path) -> None:
     """Read a parameter file of Nav2."""
     (folder / "nav2.yaml").write_bytes(data)
-    load_amcl_config(folder / "nav2.yaml")
+    load_node_config(folder / "nav2.yaml")
 
 
 def read_saved_pose(data: bytes, folder: Path) -> None:

@@ -14,9 +14,9 @@ HEAD = """# All parameters of the node, with their defaults: keep the lines that
 # Names are those of Nav2's AMCL; docs/reference/settings.md has the ranges.
 /**:
   ros__parameters:
-    # whether a simulator or a bag gives the time
+    # whether a simulator or a bag provides the time
     use_sim_time: false
-    # With rclpy there is one more: the node configures and activates itself, without a manager.
+    # With rclpy only: the node configures and activates itself, without a lifecycle manager.
     # autostart: true
 """
 
@@ -24,17 +24,17 @@ HEAD = """# All parameters of the node, with their defaults: keep the lines that
 def text() -> str:
     """Return the whole file."""
     lines: list[str] = []
+    group = meaning = ""
     for parameter in parameters():
-        first, _, part = parameter.name.partition(".")
-        if part in ("", "x"):
-            meaning = parameter.description
-            if parameter.choices:
-                meaning += f"; one of {', '.join(parameter.choices)}"
-            lines.append(f"    # {meaning}\n")
-        if part == "x":
-            lines.append(f"    {first}:\n")
-        indent = "      " if part else "    "
-        lines.append(f"{indent}{part or first}: {_shown(parameter.default)}\n")
+        before, (group, _, name) = group, parameter.name.rpartition(".")
+        if group and group != before:
+            lines.append(f"    {group}:\n")
+        words = f"; one of {', '.join(parameter.choices)}" if parameter.choices else ""
+        told, meaning = meaning, parameter.description + words
+        indent = "      " if group else "    "
+        if meaning != told:
+            lines.append(f"{indent}# {meaning}\n")
+        lines.append(f"{indent}{name}: {_shown(parameter.default)}\n")
     return HEAD + "".join(lines)
 
 

@@ -9,7 +9,6 @@ import pytest
 
 from firstfix.amcl.config import AmclConfig, MotionModel, SensorModel
 from firstfix.core.errors import InputError
-from firstfix.core.se2 import SE2
 
 # nav2_amcl, the defaults that its documentation and its code give.
 NAV2 = {
@@ -18,25 +17,18 @@ NAV2 = {
     "alpha3": 0.2,
     "alpha4": 0.2,
     "alpha5": 0.2,
-    "always_reset_initial_pose": False,
-    "base_frame_id": "base_footprint",
     "beam_skip_distance": 0.5,
     "beam_skip_error_threshold": 0.9,
     "beam_skip_threshold": 0.3,
     "do_beamskip": False,
-    "first_map_only": False,
-    "global_frame_id": "map",
-    "initial_pose": SE2.identity(),
     "lambda_short": 0.1,
     "laser_likelihood_max_dist": 2.0,
     "laser_max_range": 100.0,
     "laser_min_range": -1.0,
     "laser_model_type": SensorModel("likelihood_field"),
-    "map_topic": "map",
     "max_beams": 60,
     "max_particles": 2000,
     "min_particles": 500,
-    "odom_frame_id": "odom",
     "pf_err": 0.05,
     "pf_z": 0.99,
     "random_seed": -1,
@@ -44,12 +36,7 @@ NAV2 = {
     "recovery_alpha_slow": 0.0,
     "resample_interval": 1,
     "robot_model_type": MotionModel("nav2_amcl::DifferentialMotionModel"),
-    "save_pose_rate": 0.5,
-    "scan_topic": "scan",
-    "set_initial_pose": False,
     "sigma_hit": 0.2,
-    "tf_broadcast": True,
-    "transform_tolerance": 1.0,
     "update_min_a": 0.2,
     "update_min_d": 0.25,
     "z_hit": 0.5,

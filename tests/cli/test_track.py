@@ -182,7 +182,7 @@ def test_the_pose_is_saved_as_often_as_the_parameters_say(
 ) -> None:
     stamps: list[float] = []
     monkeypatch.setattr(
-        "firstfix.ros.pose_keeper.save_pose", lambda path, saved: stamps.append(saved.stamp)
+        "firstfix.ros.pose_memory.save_pose", lambda path, saved: stamps.append(saved.stamp)
     )
     cli("track", *files, "--save-pose", "last.json")
     np.testing.assert_allclose(stamps, [102.0, 104.0, 106.0, 106.5], atol=0.11)

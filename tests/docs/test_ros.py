@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from firstfix.ros.arguments import names_from, settings_from
-from firstfix.ros.channels import PARTICLES, heard_topics, said_topics
+from firstfix.ros.channels import PARTICLES, published_topics, subscribed_topics
 from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.parameters import configured, flattened, parameters
 
@@ -32,7 +32,7 @@ def test_topics_are_those_of_the_node() -> None:
         for way, name, kind, delivery in table("Topics")
     }
     full = NodeConfig(mode=Mode.FULL)
-    said = [*said_topics(NodeConfig(), PARTICLES), *said_topics(full, PARTICLES)]
+    said = [*published_topics(NodeConfig(), PARTICLES), *published_topics(full, PARTICLES)]
     deliveries = {
         "SENSOR": "best effort",
         "RELIABLE": "reliable",
@@ -41,7 +41,7 @@ def test_topics_are_those_of_the_node() -> None:
     }
     assert told == {
         (way, topic.name, topic.type_name, deliveries[topic.delivery.name])
-        for way, topics in (("in", heard_topics(full).values()), ("out", said))
+        for way, topics in (("in", subscribed_topics(full).values()), ("out", said))
         for topic in topics
     }
 

@@ -13,7 +13,7 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.io.ros_messages.outgoing import laser_scan, occupancy_grid, transforms
 from firstfix.lab.simulation.lidar import Lidar
-from firstfix.ros.channels import PARTICLES, Heard, Topic
+from firstfix.ros.channels import PARTICLES, Channel, Topic
 from firstfix.ros.transport import Severity
 
 ODOM, BASE, LASER = "odom", "base_footprint", "laser"
@@ -44,19 +44,19 @@ class Recorder:
         assert kind == topic.type_name
         self.published.append((topic, self.wire.sent(message)))
 
-    def listeners(self, topic: Topic) -> int:
+    def subscriber_count(self, topic: Topic) -> int:
         return self.listening.get(topic.name, 0)
 
-    def log(self, gravity: Severity, text: str) -> None:
-        self.lines.append((gravity, text))
+    def log(self, severity: Severity, text: str) -> None:
+        self.lines.append((severity, text))
 
     def on(self, topic: Topic) -> list[Any]:
         """Return the messages of a topic, in order."""
         return [message for where, message in self.published if where is topic]
 
-    def told(self, gravity: Severity) -> list[str]:
+    def told(self, severity: Severity) -> list[str]:
         """Return the lines of the log that are that grave."""
-        return [text for how, text in self.lines if how is gravity]
+        return [text for how, text in self.lines if how is severity]
 
 
 class Speaker:
@@ -90,9 +90,9 @@ class Speaker:
         scan = self._lidar.scan(self.world, self.pose, self._rng, self.stamp)
         return self.wire.sent(laser_scan(self.wire.make, frame, scan))
 
-    def report(self, hear: Callable[[Heard, Any], Any]) -> list[Any]:
+    def report(self, hear: Callable[[Channel, Any], Any]) -> list[Any]:
         """Tell odometry, then the scan at the same time; return what was answered."""
-        return [hear(Heard.TF, self.tf()), hear(Heard.SCAN, self.scan())]
+        return [hear(Channel.TF, self.tf()), hear(Channel.SCAN, self.scan())]
 
 
 def wait_for(what: Callable[[], Any], seconds: float = 240.0) -> Any:

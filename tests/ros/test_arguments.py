@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from firstfix.amcl.config import AmclConfig, MotionModel
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
+from firstfix.localizer.config import LocalizerConfig
 from firstfix.ros.arguments import names_from, settings_from
 from firstfix.ros.node_config import Mode, NodeConfig
 
@@ -70,11 +71,11 @@ def test_assignments_have_the_types_of_ros():
     config = settings(given_so)
     assert config.mode is Mode.FULL
     assert config.cloud_rate == 5.0
-    assert config.amcl.tf_broadcast is False
-    assert config.amcl.alpha1 == 0.1
-    assert config.amcl.scan_topic == "7"
-    assert config.amcl.initial_pose == SE2(0.0, 0.0, -0.5)
-    assert (config.amcl.max_particles, config.amcl.min_particles) == (900, 9)
+    assert config.tf_broadcast is False
+    assert config.localizer.amcl.alpha1 == 0.1
+    assert config.scan_topic == "7"
+    assert config.initial_pose == SE2(0.0, 0.0, -0.5)
+    assert (config.localizer.amcl.max_particles, config.localizer.amcl.min_particles) == (900, 9)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +112,7 @@ def test_a_file_has_a_section_for_the_node_or_for_all(written, section):
     )
     config = settings(files=[file])
     assert config.mode is Mode.FULL
-    assert config.amcl.initial_pose == SE2(1.0, 2.0, 0.5)
+    assert config.initial_pose == SE2(1.0, 2.0, 0.5)
 
 
 def test_later_arguments_count_more(written):
@@ -119,7 +120,7 @@ def test_later_arguments_count_more(written):
     one = written("firstfix:\n  ros__parameters: {max_beams: 40, cloud_rate: 1.0}\n", "one.yaml")
     two = written("firstfix:\n  ros__parameters: {cloud_rate: 3.0, status_rate: 1.0}\n", "two.yaml")
     config = settings(["status_rate:=9.0", "mode:=full"], [one, two], amcl, mode="bootstrap")
-    assert (config.amcl.alpha1, config.amcl.max_beams) == (0.5, 40)
+    assert (config.localizer.amcl.alpha1, config.localizer.amcl.max_beams) == (0.5, 40)
     assert (config.cloud_rate, config.status_rate) == (3.0, 9.0)
     assert config.mode is Mode.BOOTSTRAP
 
@@ -129,12 +130,11 @@ def test_all_of_amcl_comes_over_from_its_file(written):
         "amcl:\n  ros__parameters:\n    robot_model_type: omnidirectional\n"
         "    set_initial_pose: true\n    initial_pose: {x: 1.0, y: -2.0, yaw: 0.5}\n"
     )
-    expected = AmclConfig(
-        robot_model_type=MotionModel.OMNIDIRECTIONAL,
+    assert settings(amcl_file=file) == NodeConfig(
         set_initial_pose=True,
         initial_pose=SE2(1.0, -2.0, 0.5),
+        localizer=LocalizerConfig(amcl=AmclConfig(robot_model_type=MotionModel.OMNIDIRECTIONAL)),
     )
-    assert settings(amcl_file=file).amcl == expected
 
 
 def test_a_file_of_another_node_is_refused(written):

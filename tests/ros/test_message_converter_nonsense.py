@@ -11,13 +11,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from recorder import Speaker
 
-from firstfix.amcl.config import AmclConfig
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.states import State
-from firstfix.ros.channels import Heard
+from firstfix.ros.channels import Channel
 from firstfix.ros.message_converter import MessageConverter
+from firstfix.ros.node_config import NodeConfig
 
 THERE = SE2(4.0, 3.0, 1.0)
 NUMBERS = (
@@ -64,21 +64,21 @@ SCANS = st.builds(
 TFS = st.builds(Message, transforms=st.lists(TRANSFORMS, max_size=3))
 # What changes the robot, its clock or its world in earnest.
 CHANGES = st.one_of(
-    st.tuples(st.sampled_from([Heard.TF, Heard.TF_STATIC]), TFS),
+    st.tuples(st.sampled_from([Channel.TF, Channel.TF_STATIC]), TFS),
     st.tuples(
-        st.just(Heard.ODOM), st.builds(Message, header=HEADERS, child_frame_id=FRAMES, pose=POSES)
+        st.just(Channel.ODOM), st.builds(Message, header=HEADERS, child_frame_id=FRAMES, pose=POSES)
     ),
-    st.tuples(st.just(Heard.MAP), MAPS),
+    st.tuples(st.just(Channel.MAP), MAPS),
 )
 NUISANCES = st.one_of(
-    st.tuples(st.just(Heard.INITIAL_POSE), st.builds(Message, header=HEADERS, pose=POSES)),
-    st.tuples(st.just(Heard.SCAN), SCANS),
+    st.tuples(st.just(Channel.INITIAL_POSE), st.builds(Message, header=HEADERS, pose=POSES)),
+    st.tuples(st.just(Channel.SCAN), SCANS),
     st.tuples(
-        st.sampled_from([Heard.CLIFF, Heard.WHEEL_DROP, Heard.BUMPER, Heard.KIDNAPPED]),
+        st.sampled_from([Channel.CLIFF, Channel.WHEEL_DROP, Channel.BUMPER, Channel.KIDNAPPED]),
         st.builds(Message, wheel=st.integers(0, 3), state=st.integers(0, 255))
         | st.builds(Message, data=st.booleans() | NUMBERS),
     ),
-    st.tuples(st.sampled_from([Heard.RESET, Heard.UPDATE]), st.none()),
+    st.tuples(st.sampled_from([Channel.RESET, Channel.UPDATE]), st.none()),
 )
 HEARD = CHANGES | NUISANCES
 
@@ -87,11 +87,11 @@ class Pair:
     """What a node has, without its thread."""
 
     def __init__(self, cache):
-        self._intake = MessageConverter(AmclConfig(), lambda subject, text: None)
+        self._converter = MessageConverter(NodeConfig(), lambda subject, text: None)
         self.localizer = Localizer(cache_dir=cache)
 
     def take(self, heard, message):
-        for given_ in self._intake.take(heard, message):
+        for given_ in self._converter.convert(heard, message):
             self.localizer.handle(given_)
 
 
@@ -110,7 +110,7 @@ def test_whatever_is_heard_only_errors_of_ours_come_of_it(ros2, hall_plan, cache
         for heard, message in messages:
             with contextlib.suppress(InputError):
                 pair.take(heard, message)
-        for heard, message in ((Heard.MAP, robot.map()), (Heard.TF_STATIC, robot.fixed())):
+        for heard, message in ((Channel.MAP, robot.map()), (Channel.TF_STATIC, robot.fixed())):
             with contextlib.suppress(InputError):
                 pair.take(heard, message)
         robot.move()
@@ -125,14 +125,14 @@ def test_whatever_is_heard_only_errors_of_ours_come_of_it(ros2, hall_plan, cache
 def test_after_any_nonsense_a_robot_that_reports_well_is_found(ros2, hall_plan, cache, messages):
     robot = Speaker(ros2, hall_plan, THERE)
     pair = Pair(cache)
-    pair.take(Heard.MAP, robot.map())
-    pair.take(Heard.TF_STATIC, robot.fixed())
+    pair.take(Channel.MAP, robot.map())
+    pair.take(Channel.TF_STATIC, robot.fixed())
     robot.report(pair.take)
     assert pair.localizer.state is State.LOCALIZED
     for heard, message in messages:
         with contextlib.suppress(InputError):
             pair.take(heard, message)
-    for heard in (Heard.CLIFF, Heard.WHEEL_DROP, Heard.BUMPER, Heard.KIDNAPPED):
+    for heard in (Channel.CLIFF, Channel.WHEEL_DROP, Channel.BUMPER, Channel.KIDNAPPED):
         for which in range(4):
             pair.take(heard, Message(wheel=which, state=0))
     for _ in range(30):

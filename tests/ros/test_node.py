@@ -16,9 +16,10 @@ from firstfix.io.maps.map_server import save_map
 from firstfix.io.ros_messages.incoming import to_planar, to_pose
 from firstfix.io.ros_messages.outgoing import occupancy_grid, pose_with_covariance
 from firstfix.localizer.inputs import NewMap, PoseHint, Reset
+from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.states import State
 from firstfix.ros import node as node_module
-from firstfix.ros.channels import AMCL_POSE, INITIAL_POSE, STATUS, Heard
+from firstfix.ros.channels import AMCL_POSE, INITIAL_POSE, STATUS, Channel
 from firstfix.ros.node import Node
 from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.transport import Severity
@@ -34,7 +35,7 @@ class Running:
         self.handled = []
         self.state = State.NO_MAP
         self.node = Node(NodeConfig(**settings), recorder, [self._watch])
-        self.hear = self.node.hear
+        self.receive = self.node.receive
 
     def _watch(self, given, outputs, localizer):
         self.handled.append((given, outputs))
@@ -70,9 +71,9 @@ def robot(ros2, hall_plan):
 
 def introduce(running, robot):
     """Tell map, place of the laser, and odometry and scan of now."""
-    running.hear(Heard.MAP, robot.map())
-    running.hear(Heard.TF_STATIC, robot.fixed())
-    robot.report(running.hear)
+    running.receive(Channel.MAP, robot.map())
+    running.receive(Channel.TF_STATIC, robot.fixed())
+    robot.report(running.receive)
 
 
 # ---- found, and handed over
@@ -101,9 +102,9 @@ def test_its_own_pose_that_comes_back_is_no_hint(run, robot, recorder):
     introduce(running, robot)
     (own,) = wait_for(lambda: recorder.on(INITIAL_POSE))
     for _ in range(3):
-        running.hear(Heard.INITIAL_POSE, own)
+        running.receive(Channel.INITIAL_POSE, own)
         robot.move()
-        robot.report(running.hear)
+        robot.report(running.receive)
     running.wait_until_handled(LaserScan, 2)
     assert running.given(PoseHint) == []
     assert running.state is State.LOCALIZED
@@ -113,10 +114,12 @@ def test_its_own_pose_that_comes_back_is_no_hint(run, robot, recorder):
 def test_the_pose_of_a_person_is_a_hint(run, robot, ros2):
     running = run(mode=Mode.FULL)
     introduce(running, robot)
-    running.hear(Heard.INITIAL_POSE, pose_with_covariance(ros2.make, 0.0, "map", THERE, np.eye(3)))
+    running.receive(
+        Channel.INITIAL_POSE, pose_with_covariance(ros2.make, 0.0, "map", THERE, np.eye(3))
+    )
     running.wait_until_handled(PoseHint)
     robot.move()
-    robot.report(running.hear)
+    robot.report(running.receive)
     wait_for(lambda: running.state is State.LOCALIZED and len(running.given(LaserScan)) > 1)
 
 
@@ -124,10 +127,10 @@ def test_a_request_to_search_anew_is_followed(run, robot):
     running = run(mode=Mode.FULL)
     introduce(running, robot)
     wait_for(lambda: running.state is State.LOCALIZED)
-    running.hear(Heard.RESET)
+    running.receive(Channel.RESET)
     running.wait_until_handled(Reset)
     robot.move()
-    robot.report(running.hear)
+    robot.report(running.receive)
     wait_for(lambda: running.state is State.LOCALIZED)
 
 
@@ -136,9 +139,9 @@ def test_a_clock_set_back_is_survived(run, robot, recorder):
     introduce(running, robot)
     wait_for(lambda: running.state is State.LOCALIZED)
     robot.stamp = 5.0
-    robot.report(running.hear)
+    robot.report(running.receive)
     wait_for(lambda: [m for m in recorder.on(AMCL_POSE) if to_pose(m).stamp == 5.0])
-    assert recorder.told(Severity.WARNING) == ["time went back by 95.0 s: beginning anew"]
+    assert recorder.told(Severity.WARNING) == ["time went back by 95.0 s: starting over"]
 
 
 # ---- threads
@@ -149,9 +152,9 @@ def test_of_a_burst_no_odometry_is_lost_and_the_newest_scan_is_used(run, robot):
     introduce(running, robot)
     for i in range(1000):
         robot.move(SE2(0.0, 0.0, 0.001), 0.01)
-        running.hear(Heard.TF, robot.tf())
+        running.receive(Channel.TF, robot.tf())
         if i % 10 == 9:
-            running.hear(Heard.SCAN, robot.scan())
+            running.receive(Channel.SCAN, robot.scan())
     running.node.start()
     running.wait_until_handled(LaserScan)
     assert [given.stamp for given in running.given(Odometry)] == pytest.approx(
@@ -168,8 +171,8 @@ def test_callbacks_of_many_threads_are_served_by_one(run, robot, recorder):
 
     def ask() -> None:
         for _ in range(50):
-            running.hear(Heard.UPDATE)
-            running.hear(Heard.SCAN, robot.scan())
+            running.receive(Channel.UPDATE)
+            running.receive(Channel.SCAN, robot.scan())
 
     threads = [threading.Thread(target=ask) for _ in range(4)]
     for thread in threads:
@@ -188,24 +191,24 @@ def test_it_can_be_stopped_before_between_and_after(run):
         running.node.stop()
         running.node.stop()
         assert not running.node._worker.is_alive()
-    running.hear(Heard.RESET)  # of a callback that came too late
+    running.receive(Channel.RESET)  # of a callback that came too late
 
 
 def test_the_end_waits_for_what_is_being_thought_and_begins_nothing_more(run, robot):
     running = run(mode=Mode.FULL)
     introduce(running, robot)
     for _ in range(200):
-        running.hear(Heard.RESET)
+        running.receive(Channel.RESET)
     running.node.stop()
     assert not running.node._worker.is_alive()
     handled = len(running.handled)
     assert handled < 200
-    running.hear(Heard.RESET)
+    running.receive(Channel.RESET)
     assert len(running.handled) == handled
 
 
 def test_the_end_does_not_wait_for_ever(run, robot, recorder, monkeypatch):
-    monkeypatch.setattr(node_module, "_END_S", 0.05)
+    monkeypatch.setattr(node_module, "_STOP_S", 0.05)
     begun, go_on = threading.Event(), threading.Event()
 
     def think(given, outputs, localizer):
@@ -214,7 +217,7 @@ def test_the_end_does_not_wait_for_ever(run, robot, recorder, monkeypatch):
 
     node = Node(NodeConfig(), recorder, [think])
     node.start()
-    node.hear(Heard.MAP, robot.map())
+    node.receive(Channel.MAP, robot.map())
     assert begun.wait(60.0)
     node.stop()
     assert node._worker.is_alive()
@@ -242,12 +245,57 @@ def test_an_error_of_its_own_ends_nothing_and_is_told_once(run, robot, ros2, mon
     introduce(running, robot)
     for _ in range(5):
         robot.move()
-        robot.report(running.hear)
+        robot.report(running.receive)
         wait_for(lambda: [m for m in recorder.on(AMCL_POSE) if to_pose(m).stamp == robot.stamp])
-        running.hear(Heard.RESET)
+        running.receive(Channel.RESET)
     (error,) = recorder.told(Severity.ERROR)
     assert error.startswith("an error of firstfix itself:\nTraceback")
     assert "the wire is cut" in error
+
+
+def test_a_localizer_that_fails_is_replaced_and_searches_the_same_map(
+    run, robot, recorder, monkeypatch
+):
+    running = run(mode=Mode.FULL)
+    introduce(running, robot)
+    wait_for(lambda: running.state is State.LOCALIZED)
+    handle = Localizer.handle
+
+    def fail_once(self, given):
+        monkeypatch.setattr(Localizer, "handle", handle)
+        del self._tracker  # half-changed
+        raise ZeroDivisionError("by chance")
+
+    monkeypatch.setattr(Localizer, "handle", fail_once)
+    running.receive(Channel.UPDATE)
+    wait_for(lambda: running.state is State.SEARCHING)
+    wait_for(lambda: len(recorder.told(Severity.ERROR)) == 2)
+    said, traceback = recorder.told(Severity.ERROR)
+    assert said == "the localizer failed and was reset: searching the whole map again"
+    assert "by chance" in traceback
+    robot.move()
+    robot.report(running.receive)
+    wait_for(lambda: running.state is State.LOCALIZED)
+
+
+def test_a_localizer_that_fails_on_a_new_map_keeps_the_old_one(run, robot, ros2, monkeypatch):
+    running = run(mode=Mode.FULL)
+    introduce(running, robot)
+    wait_for(lambda: running.state is State.LOCALIZED)
+    handle = Localizer.handle
+    other = OccupancyGrid(np.rot90(robot.world.cells).copy(), robot.world.resolution)
+
+    def fail_on_another(self, given):
+        if isinstance(given, NewMap) and given.grid.width == other.width:
+            raise ZeroDivisionError("by chance")
+        return handle(self, given)
+
+    monkeypatch.setattr(Localizer, "handle", fail_on_another)
+    running.receive(Channel.MAP, ros2.sent(occupancy_grid(ros2.make, 2.0, "map", other)))
+    wait_for(lambda: running.state is State.SEARCHING)
+    robot.move()
+    robot.report(running.receive)
+    wait_for(lambda: running.state is State.LOCALIZED)
 
 
 def test_nonsense_is_told_in_one_sentence_and_ends_nothing(run, robot, recorder):
@@ -255,57 +303,57 @@ def test_nonsense_is_told_in_one_sentence_and_ends_nothing(run, robot, recorder)
     introduce(running, robot)
     bad = robot.scan()
     bad.range_max = 0.0
-    running.hear(Heard.SCAN, bad)
+    running.receive(Channel.SCAN, bad)
     warning = wait_for(lambda: recorder.told(Severity.WARNING))[0]
     assert warning.startswith("expected a range_max above range_min, received")
-    robot.report(running.hear)
+    robot.report(running.receive)
     wait_for(lambda: running.state is State.LOCALIZED)
 
 
 def test_each_subject_is_told_once_in_a_while(run, robot, recorder, monkeypatch):
     monkeypatch.setattr(node_module, "_REPEAT_S", 1000.0)
     running = run()
-    running.hear(Heard.MAP, robot.map())
+    running.receive(Channel.MAP, robot.map())
     for i in range(20):
         robot.move()
-        running.hear(Heard.TF, robot.tf())
-        running.hear(Heard.SCAN, robot.scan("lidar"))  # nobody knows where that is
+        running.receive(Channel.TF, robot.tf())
+        running.receive(Channel.SCAN, robot.scan("lidar"))  # nobody knows where that is
         bad = robot.map()
         bad.info.width = i  # each time another sentence
-        running.hear(Heard.MAP, bad)
-        running.hear(Heard.UPDATE)
+        running.receive(Channel.MAP, bad)
+        running.receive(Channel.UPDATE)
         wait_for(lambda n=i + 1: len(running.given(Odometry)) == n)
     about_maps, about_scans = sorted(recorder.told(Severity.WARNING), reverse=True)
     assert about_maps.startswith("expected 0 x 160 cells")
-    assert about_scans.startswith("1 scans left out so far; the place of the laser is not known")
+    assert about_scans.startswith("1 scans dropped so far; the pose of the laser is unknown")
 
 
 def test_warnings_come_again_when_their_time_is_over(run, recorder, monkeypatch):
     monkeypatch.setattr(node_module, "_REPEAT_S", 0.0)
     running = run()
     for _ in range(3):
-        running.hear(Heard.CLIFF, SimpleNamespace(data="no event"))
+        running.receive(Channel.CLIFF, SimpleNamespace(data="no event"))
     wait_for(lambda: len(recorder.told(Severity.WARNING)) == 3)
 
 
 def test_silent_topics_are_named_although_others_speak(run, robot, recorder, monkeypatch):
-    monkeypatch.setattr(node_module, "_LOOK_S", 0.05)
+    monkeypatch.setattr(node_module, "_SILENCE_S", 0.05)
     running = run()
 
     def speak():
         robot.move(seconds=0.01)
-        running.hear(Heard.TF, robot.tf())
+        running.receive(Channel.TF, robot.tf())
         return len(recorder.told(Severity.WARNING)) >= 2
 
     wait_for(speak)
     assert sorted(recorder.told(Severity.WARNING)) == [
-        "nothing heard on map (nav_msgs/OccupancyGrid) for 0 s",
-        "nothing heard on scan (sensor_msgs/LaserScan) for 0 s",
+        "no message on map (nav_msgs/OccupancyGrid) for 0 s",
+        "no message on scan (sensor_msgs/LaserScan) for 0 s",
     ]
 
 
 def test_scans_that_need_no_conversion_are_heard_too(run, robot, recorder, monkeypatch, hall_plan):
-    monkeypatch.setattr(node_module, "_LOOK_S", 0.2)
+    monkeypatch.setattr(node_module, "_SILENCE_S", 0.2)
     running = run(mode=Mode.FULL)
     running.node.give(NewMap(0.0, hall_plan))
     running.node.give(Odometry(1.0, SE2.identity()))
@@ -322,8 +370,8 @@ def test_scans_that_need_no_conversion_are_heard_too(run, robot, recorder, monke
 def test_a_map_of_its_own_is_read_at_the_start(run, robot, recorder, hall_plan, tmp_path):
     save_map(hall_plan, tmp_path / "hall.yaml")
     running = run(yaml_filename=str(tmp_path / "hall.yaml"))
-    running.hear(Heard.TF_STATIC, robot.fixed())
-    robot.report(running.hear)
+    running.receive(Channel.TF_STATIC, robot.fixed())
+    robot.report(running.receive)
     (message,) = wait_for(lambda: recorder.on(INITIAL_POSE))
     assert to_planar(to_pose(message)).distance_to(THERE) < 0.1
 
@@ -354,10 +402,10 @@ def test_a_map_that_cannot_be_searched_leaves_the_one_in_use(run, robot, recorde
     introduce(running, robot)
     wait_for(lambda: running.state is State.LOCALIZED)
     empty = OccupancyGrid(np.zeros((20, 20), np.int8), 0.05)
-    running.hear(Heard.MAP, occupancy_grid(ros2.make, 3.0, "map", empty))
-    running.hear(Heard.MAP, robot.map())
+    running.receive(Channel.MAP, occupancy_grid(ros2.make, 3.0, "map", empty))
+    running.receive(Channel.MAP, robot.map())
     robot.move()
-    robot.report(running.hear)
+    robot.report(running.receive)
     running.wait_until_handled(LaserScan, 2)
     assert len(running.given(NewMap)) == 1
     assert running.state is State.LOCALIZED

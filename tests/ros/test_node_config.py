@@ -4,43 +4,67 @@ from dataclasses import fields
 
 import pytest
 
-from firstfix.amcl.config import AmclConfig
 from firstfix.core.errors import InputError
+from firstfix.core.se2 import SE2
+from firstfix.localizer.config import LocalizerConfig
 from firstfix.ros.node_config import Mode, NodeConfig
 
+# nav2_amcl, the defaults in its documentation and its code.
+NAV2 = {
+    "always_reset_initial_pose": False,
+    "base_frame_id": "base_footprint",
+    "first_map_only": False,
+    "global_frame_id": "map",
+    "initial_pose": SE2.identity(),
+    "map_topic": "map",
+    "odom_frame_id": "odom",
+    "save_pose_rate": 0.5,
+    "scan_topic": "scan",
+    "set_initial_pose": False,
+    "tf_broadcast": True,
+    "transform_tolerance": 1.0,
+}
 
-def test_out_of_the_box_it_helps_the_amcl_that_is_there():
+
+def test_defaults_assist_the_amcl_that_is_running():
     config = NodeConfig()
     assert config.mode is Mode.BOOTSTRAP
     assert config.yaml_filename == config.saved_pose_file == ""
-    assert config.amcl == AmclConfig()
+    assert config.localizer == LocalizerConfig()
 
 
-def test_modes_are_the_words_of_the_paper():
+def test_names_and_defaults_are_those_of_nav2():
+    config = NodeConfig()
+    assert {name: getattr(config, name) for name in NAV2} == NAV2
+
+
+def test_modes_have_these_names():
     assert {mode.value for mode in Mode} == {"bootstrap", "full"}
 
 
-def test_every_setting_of_its_own_says_what_it_means():
+def test_every_parameter_has_a_description():
     for entry in fields(NodeConfig):
-        if entry.name != "amcl":
+        if entry.name != "localizer":
             assert len(entry.metadata["description"]) > 10
 
 
 @pytest.mark.parametrize(
     "bad",
     [
-        {"mode": "full"},
+        {"mode": "fast"},
         {"yaml_filename": None},
         {"saved_pose_file": 5},
         {"cloud_rate": -1.0},
         {"cloud_rate": 101.0},
         {"status_rate": 0.0},
+        {"odom_frame_id": ""},
+        {"transform_tolerance": -0.1},
     ],
 )
-def test_what_does_not_fit_is_an_error_of_ours(bad):
+def test_invalid_parameters_are_refused_by_name(bad):
     with pytest.raises(InputError, match=next(iter(bad))):
         NodeConfig(**bad)
 
 
-def test_a_cloud_may_be_switched_off():
+def test_particle_clouds_can_be_switched_off():
     assert NodeConfig(cloud_rate=0).cloud_rate == 0.0

@@ -7,7 +7,6 @@ import pytest
 from numpy.testing import assert_array_equal
 from recorder import Recorder
 
-from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.particles import Particles
 from firstfix.core.estimate import Evidence, Hypothesis
 from firstfix.core.se2 import SE2
@@ -23,7 +22,7 @@ from firstfix.ros.channels import (
     PARTICLES,
     STATUS,
     TF,
-    said_topics,
+    published_topics,
 )
 from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.output_publisher import OutputPublisher
@@ -64,10 +63,10 @@ def searching(stamp, reason="nothing fits", evidence=None):
 
 
 def announced(recorder, config, *batches, particles=None):
-    announcer = OutputPublisher(config, recorder)
+    publisher = OutputPublisher(config, recorder)
     for outputs in batches:
-        announcer.announce(outputs, particles)
-    return announcer
+        publisher.publish(outputs, particles)
+    return publisher
 
 
 def status_values(message):
@@ -98,22 +97,20 @@ def test_full_follows_the_robot_itself(recorder):
 
 
 def test_transforms_hold_until_the_next_one(recorder):
-    announced(
-        recorder, NodeConfig(mode=Mode.FULL, amcl=AmclConfig(transform_tolerance=0.25)), found()
-    )
+    announced(recorder, NodeConfig(mode=Mode.FULL, transform_tolerance=0.25), found())
     (message,) = recorder.on(TF)
     assert to_seconds(message.transforms[0].header.stamp) == 10.25
 
 
 def test_somebody_else_may_broadcast_the_transform(recorder):
-    announced(recorder, NodeConfig(mode=Mode.FULL, amcl=AmclConfig(tf_broadcast=False)), found())
+    announced(recorder, NodeConfig(mode=Mode.FULL, tf_broadcast=False), found())
     assert recorder.on(TF) == []
     assert len(recorder.on(AMCL_POSE)) == 1
 
 
 def test_frames_are_those_of_the_settings(recorder):
-    amcl = AmclConfig(global_frame_id="floor2", odom_frame_id="wheels")
-    announced(recorder, NodeConfig(mode=Mode.FULL, amcl=amcl), found(), several(11.0))
+    frames = {"global_frame_id": "floor2", "odom_frame_id": "wheels"}
+    announced(recorder, NodeConfig(mode=Mode.FULL, **frames), found(), several(11.0))
     (transform,) = recorder.on(TF)[0].transforms
     assert (transform.header.frame_id, transform.child_frame_id) == ("floor2", "wheels")
     assert recorder.on(AMCL_POSE)[0].header.frame_id == "floor2"
@@ -126,7 +123,7 @@ def test_nothing_is_published_that_was_not_advertised(ros2, config, particles):
     recorder = Recorder(ros2, particles)
     recorder.listening = {particles.name: 1, INITIAL_POSE.name: 1}
     announced(recorder, config, searching(1.0), several(2.0), found(3.0), particles=cloud())
-    said = set(said_topics(config, particles))
+    said = set(published_topics(config, particles))
     assert {topic for topic, _ in recorder.published} == said
 
 
@@ -134,19 +131,19 @@ def test_nothing_is_published_that_was_not_advertised(ros2, config, particles):
 
 
 def test_an_amcl_that_comes_late_gets_the_pose_of_now(recorder):
-    announcer = announced(recorder, BOOTSTRAP, found(10.0))
+    publisher = announced(recorder, BOOTSTRAP, found(10.0))
     recorder.listening["initialpose"] = 1
     for stamp in (20.0, 20.1):
-        announcer.announce(tracked(stamp), None)
+        publisher.publish(tracked(stamp), None)
     assert [to_pose(message).stamp for message in recorder.on(INITIAL_POSE)] == [10.0, 20.0]
 
 
 def test_an_amcl_that_is_restarted_gets_the_pose_again(recorder):
     recorder.listening["initialpose"] = 1
-    announcer = announced(recorder, BOOTSTRAP, found(10.0))
+    publisher = announced(recorder, BOOTSTRAP, found(10.0))
     for stamp, listening in ((11.0, 1), (12.0, 0), (13.0, 0), (14.0, 1), (15.0, 1)):
         recorder.listening["initialpose"] = listening
-        announcer.announce(tracked(stamp), None)
+        publisher.publish(tracked(stamp), None)
     assert [to_pose(message).stamp for message in recorder.on(INITIAL_POSE)] == [10.0, 14.0]
 
 
@@ -156,16 +153,16 @@ def test_found_elsewhere_is_handed_over_anew(recorder):
 
 
 def test_own_poses_are_told_from_those_of_people(recorder, ros2):
-    announcer = announced(recorder, BOOTSTRAP, *(found(float(stamp)) for stamp in range(10, 15)))
-    assert all(announcer.is_own(message) for message in recorder.on(INITIAL_POSE))
+    publisher = announced(recorder, BOOTSTRAP, *(found(float(stamp)) for stamp in range(10, 15)))
+    assert all(publisher.is_own(message) for message in recorder.on(INITIAL_POSE))
     for stamp, T in ((10.0, SE2(1.0, 2.0, 0.6)), (10.5, HERE)):
         person = pose_with_covariance(ros2.make, stamp, "map", T, COVARIANCE)
-        assert not announcer.is_own(ros2.sent(person))
+        assert not publisher.is_own(ros2.sent(person))
 
 
 def test_the_memory_of_own_poses_is_bounded(recorder):
-    announcer = announced(recorder, BOOTSTRAP, *(found(float(stamp)) for stamp in range(100)))
-    assert sum(announcer.is_own(message) for message in recorder.on(INITIAL_POSE)) == 10
+    publisher = announced(recorder, BOOTSTRAP, *(found(float(stamp)) for stamp in range(100)))
+    assert sum(publisher.is_own(message) for message in recorder.on(INITIAL_POSE)) == 10
 
 
 # ---- particles
@@ -176,12 +173,12 @@ def stamps_of(messages):
 
 
 def test_a_cloud_is_published_at_its_rate_and_only_where_it_is_heard(recorder):
-    announcer = OutputPublisher(NodeConfig(mode=Mode.FULL, cloud_rate=2.0), recorder)
+    publisher = OutputPublisher(NodeConfig(mode=Mode.FULL, cloud_rate=2.0), recorder)
     for i in range(10):
         recorder.listening[PARTICLES.name] = int(i >= 2)
-        announcer.announce(tracked(10.0 + 0.2 * i), cloud())
+        publisher.publish(tracked(10.0 + 0.2 * i), cloud())
     assert stamps_of(recorder.on(PARTICLES)) == pytest.approx([10.4, 11.0, 11.6])
-    announcer.announce(tracked(3.0), cloud())  # the clock was set back
+    publisher.publish(tracked(3.0), cloud())  # the clock was set back
     assert stamps_of(recorder.on(PARTICLES))[-1] == 3.0
 
 
@@ -264,25 +261,25 @@ def test_a_robot_that_is_not_found_is_a_warning_and_one_without_a_map_an_error(r
 
 
 def test_status_comes_at_its_rate_and_at_every_change(recorder):
-    announcer = OutputPublisher(NodeConfig(mode=Mode.FULL, status_rate=2.0), recorder)
+    publisher = OutputPublisher(NodeConfig(mode=Mode.FULL, status_rate=2.0), recorder)
     for i in range(11):
-        announcer.announce(tracked(10.0 + 0.1 * i), None)
+        publisher.publish(tracked(10.0 + 0.1 * i), None)
     assert stamps_of(recorder.on(STATUS)) == pytest.approx([10.0, 10.5, 11.0])
-    announcer.announce(searching(11.01), None)
-    announcer.announce(tracked(11.02), None)
+    publisher.publish(searching(11.01), None)
+    publisher.publish(tracked(11.02), None)
     assert stamps_of(recorder.on(STATUS))[-2:] == pytest.approx([11.01, 11.02])
-    announcer.announce(tracked(3.0), None)  # the clock was set back
+    publisher.publish(tracked(3.0), None)  # the clock was set back
     assert stamps_of(recorder.on(STATUS))[-1] == 3.0
 
 
 def test_the_log_tells_of_changes_and_once_in_a_while_why_nothing_is_found(recorder):
-    announcer = OutputPublisher(FULL, recorder)
-    announcer.announce(searching(0.0, "a map came"), None)
+    publisher = OutputPublisher(FULL, recorder)
+    publisher.publish(searching(0.0, "a map came"), None)
     for i in range(1, 25):
-        announcer.announce(searching(1000.0 + i, f"only {i}% fit"), None)
-    announcer.announce(found(1030.0), None)
+        publisher.publish(searching(1000.0 + i, f"only {i}% fit"), None)
+    publisher.publish(found(1030.0), None)
     for i in range(100):
-        announcer.announce(tracked(1031.0 + i), None)
+        publisher.publish(tracked(1031.0 + i), None)
     assert recorder.told(Severity.INFO) == [
         "SEARCHING: a map came",
         "SEARCHING: only 1% fit",

@@ -12,17 +12,22 @@ from hypothesis import strategies as st
 from firstfix.amcl.config import AmclConfig, MotionModel, SensorModel
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
-from firstfix.io.parameters.amcl_yaml import IGNORED, load_amcl_config
+from firstfix.global_localization.config import LocateConfig
+from firstfix.io.parameters.amcl_yaml import IGNORED
 from firstfix.io.parameters.ros1_amcl import GONE, NEW_NAMES
+from firstfix.localizer.config import MonitorConfig
 from firstfix.ros.node_config import Mode, NodeConfig
-from firstfix.ros.parameters import Parameter, configured, flattened, parameters
+from firstfix.ros.parameters import Parameter, configured, flattened, load_node_config, parameters
 
 BY_NAME = {parameter.name: parameter for parameter in parameters()}
+WITHOUT_EFFECT = ("recovery_alpha_slow", "recovery_alpha_fast")
 
 
 def test_every_setting_is_a_parameter_and_every_parameter_a_setting():
     expected = {entry.name for owner in (NodeConfig, AmclConfig) for entry in fields(owner)}
-    expected -= {"amcl", "initial_pose"}
+    expected |= {f"locate.{entry.name}" for entry in fields(LocateConfig)}
+    expected |= {f"monitor.{entry.name}" for entry in fields(MonitorConfig)}
+    expected -= {"localizer", "initial_pose"}
     expected |= {"initial_pose.x", "initial_pose.y", "initial_pose.yaw"}
     assert set(BY_NAME) == expected
     assert len(parameters()) == len(expected)
@@ -73,14 +78,16 @@ def test_what_fits_arrives(data):
     names = data.draw(st.lists(st.sampled_from(sorted(BY_NAME)), unique=True, max_size=5))
     values = {name: data.draw(fitting(BY_NAME[name])) for name in names}
     assume(values.get("min_particles", 500) <= values.get("max_particles", 2000))
+    assume(not any(values.get(name) for name in WITHOUT_EFFECT))
     config = configured(values)
     for name, value in values.items():
-        owner = config if hasattr(config, name) else config.amcl
-        if name.startswith("initial_pose."):
-            got = getattr(config.amcl.initial_pose, name.partition(".")[2])
+        section, _, short = name.rpartition(".")
+        if section == "initial_pose":
+            got = getattr(config.initial_pose, short)
             assert math.isclose(math.cos(got), math.cos(value), abs_tol=1e-9)
             continue
-        got = getattr(owner, name)
+        owner = getattr(config.localizer, section or "amcl")
+        got = getattr(config if hasattr(config, name) else owner, short)
         expected = value.removeprefix("/") if name.endswith("_frame_id") else value
         assert (got.value if isinstance(got, Enum) else got) == expected
 
@@ -88,12 +95,26 @@ def test_what_fits_arrives(data):
 def test_a_pose_has_three_parts_and_nav2s_z():
     values = {"x": 1, "y": -2.5, "z": 7.0, "yaw": 0.5}
     config = configured(flattened({"initial_pose": values}))
-    assert config.amcl.initial_pose == SE2(1.0, -2.5, 0.5)
+    assert config.initial_pose == SE2(1.0, -2.5, 0.5)
+
+
+@pytest.mark.parametrize("name", WITHOUT_EFFECT)
+def test_parameters_without_effect_in_a_node_are_refused_with_the_reason(name):
+    with pytest.raises(InputError, match=f"{name} of 0: a node recovers by searching the whole"):
+        configured({name: 0.1})
+    assert configured({name: 0.0}) == NodeConfig()
+
+
+def test_search_and_monitor_can_be_configured_on_a_robot():
+    values = {"locate.max_poses": 10**6, "locate.unique_probability": 0.9, "monitor.lost_after_s": 5.0}
+    localizer = configured(values).localizer
+    assert localizer.locate == LocateConfig(max_poses=10**6, unique_probability=0.9)
+    assert localizer.monitor == MonitorConfig(lost_after_s=5.0)
 
 
 def test_frames_lose_the_slash_of_old_ros():
     config = configured({"odom_frame_id": "/odom", "base_frame_id": "robot1/base_link"})
-    assert (config.amcl.odom_frame_id, config.amcl.base_frame_id) == ("odom", "robot1/base_link")
+    assert (config.odom_frame_id, config.base_frame_id) == ("odom", "robot1/base_link")
 
 
 def test_modes_and_models_are_words():
@@ -101,13 +122,13 @@ def test_modes_and_models_are_words():
         {"mode": "full", "laser_model_type": "beam", "robot_model_type": "stationary"}
     )
     assert config.mode is Mode.FULL
-    assert config.amcl.laser_model_type is SensorModel.BEAM
-    assert config.amcl.robot_model_type is MotionModel.STATIONARY
+    assert config.localizer.amcl.laser_model_type is SensorModel.BEAM
+    assert config.localizer.amcl.robot_model_type is MotionModel.STATIONARY
 
 
 def test_models_of_nav2_until_foxy_are_known_as_in_a_file():
     config = configured({"robot_model_type": "omnidirectional"})
-    assert config.amcl.robot_model_type is MotionModel.OMNIDIRECTIONAL
+    assert config.localizer.amcl.robot_model_type is MotionModel.OMNIDIRECTIONAL
 
 
 def test_what_every_node_has_is_passed_over():
@@ -219,4 +240,4 @@ def test_parameters_mean_what_they_mean_in_a_file(tmp_path: Path):
         "base_frame_id": "base_link",
         "initial_pose": {"x": 1.0, "y": 2.0, "z": 0.0, "yaw": 0.5},
     }
-    assert configured(flattened(values)).amcl == load_amcl_config(file)
+    assert configured(flattened(values)) == load_node_config(file)

@@ -8,7 +8,7 @@ import pytest
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.io.saved_pose import SavedPose, load_pose
-from firstfix.ros.pose_keeper import PoseKeeper
+from firstfix.ros.pose_memory import PoseKeeper
 
 
 def pose_at(stamp):
@@ -89,7 +89,7 @@ READ_ONLY = """
 import subprocess, sys
 from pathlib import Path
 import numpy as np
-from firstfix.ros.pose_keeper import PoseKeeper
+from firstfix.ros.pose_memory import PoseKeeper
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.io.saved_pose import SavedPose, load_pose

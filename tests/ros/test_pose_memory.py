@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from recorder import Recorder, Speaker, wait_for
 
-from firstfix.amcl.config import AmclConfig
 from firstfix.core.odometry import Odometry
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
@@ -17,11 +16,10 @@ from firstfix.lab.worlds.catalog import identical_rooms
 from firstfix.localizer.inputs import NewMap, PoseHint
 from firstfix.localizer.outputs import Status, TrackedPose
 from firstfix.localizer.states import State
-from firstfix.ros.channels import AMCL_POSE, STATUS, Heard
+from firstfix.ros.channels import AMCL_POSE, STATUS, Channel
 from firstfix.ros.node import Node
 from firstfix.ros.node_config import Mode, NodeConfig
-from firstfix.ros.pose_keeper import PoseKeeper
-from firstfix.ros.pose_memory import PoseMemory
+from firstfix.ros.pose_memory import PoseKeeper, PoseMemory
 from firstfix.ros.transport import Severity
 
 THERE, DRIFT = SE2(4.0, 3.0, 1.0), SE2(1.0, -2.0, 0.5)
@@ -43,9 +41,9 @@ def memory_of(file, lines):
     """Give a function that makes the memory of a node; settings are those of AMCL."""
     made = []
 
-    def memory_of(path=file, **amcl):
-        config = NodeConfig(saved_pose_file=str(path), amcl=AmclConfig(**amcl))
-        made.append(PoseMemory(config, lambda gravity, text: lines.append((gravity, text))))
+    def memory_of(path=file, **parameters):
+        config = NodeConfig(saved_pose_file=str(path), **parameters)
+        made.append(PoseMemory(config, lambda severity, text: lines.append((severity, text))))
         return made[-1]
 
     yield memory_of
@@ -153,8 +151,8 @@ def test_a_disk_that_cannot_be_written_is_told_of_once(memory_of, hall_plan, tmp
         memory.keep(localized(10.0 + i))
         wait_for(lambda: memory._writing is None or memory._writing.done())
     memory.close()
-    ((gravity, text),) = lines
-    assert gravity is Severity.WARNING
+    ((severity, text),) = lines
+    assert severity is Severity.WARNING
     assert text.startswith("the pose is not saved: expected access to")
 
 
@@ -188,8 +186,8 @@ def test_a_saved_pose_is_carried_on_by_odometry(memory_of, hall_plan, file, line
     hint = at_start(memory_of(), hall_plan)
     assert (hint.stamp, hint.source) == (200.0, "the saved pose")
     assert hint.T_map_base.distance_to(THERE @ SE2(0.1, 0.0, 0.0)) < 1e-9
-    ((gravity, text),) = lines
-    assert gravity is Severity.INFO
+    ((severity, text),) = lines
+    assert severity is Severity.INFO
     assert text == (
         "the saved pose is carried on by odometry: saved 100 s ago; "
         "odometry says that the robot has moved 0.10 m since"
@@ -224,8 +222,8 @@ def test_a_broken_file_is_told_in_one_line_and_left_alone(
 ):
     file.write_bytes(content)
     assert at_start(memory_of(), hall_plan) is None
-    ((gravity, text),) = lines
-    assert gravity is Severity.WARNING
+    ((severity, text),) = lines
+    assert severity is Severity.WARNING
     assert text.startswith("the saved pose cannot be used: expected")
     assert "\n" not in text
     assert file.read_bytes() == content
@@ -282,14 +280,15 @@ def test_the_word_of_a_person_comes_before_all(memory_of, hall_plan, file):
 class Life:
     """A node between start and stop, and the robot that it hears."""
 
-    def __init__(self, wire, robot, file, **amcl):
+    def __init__(self, wire, robot, file, **parameters):
         self.recorder = Recorder(wire)
         self._robot = robot
         self._looked = threading.Event()
         config = NodeConfig(
             mode=Mode.FULL,
             saved_pose_file=str(file),
-            amcl=AmclConfig(save_pose_rate=5.0, **amcl),
+            save_pose_rate=5.0,
+            **parameters,
         )
         self._node = Node(config, self.recorder, [self._watch])
         self.state = State.NO_MAP
@@ -301,8 +300,8 @@ class Life:
 
     def __enter__(self):
         self._node.start()
-        self._node.hear(Heard.MAP, self._robot.map())
-        self._node.hear(Heard.TF_STATIC, self._robot.fixed())
+        self._node.receive(Channel.MAP, self._robot.map())
+        self._node.receive(Channel.TF_STATIC, self._robot.fixed())
         self.look()
         return self
 
@@ -313,11 +312,11 @@ class Life:
         """Let the robot report, and wait until the node has thought about it."""
         self._robot.move()
         self._looked.clear()
-        self._robot.report(self._node.hear)
+        self._robot.report(self._node.receive)
         assert self._looked.wait(60.0)
 
-    def hear(self, heard, message=None):
-        self._node.hear(heard, message)
+    def receive(self, heard, message=None):
+        self._node.receive(heard, message)
 
     @property
     def reason(self):
@@ -336,14 +335,14 @@ def test_in_a_building_of_equal_rooms_a_restarted_node_knows_its_room(ros2, file
     with Life(ros2, robot, file) as first:
         assert first.state is State.DISAMBIGUATING  # nobody could know
         person = pose_with_covariance(ros2.make, 0.0, "map", IN_ROOM_1, np.eye(3))
-        first.hear(Heard.INITIAL_POSE, person)
+        first.receive(Channel.INITIAL_POSE, person)
         first.look()
         assert first.state is State.LOCALIZED
     assert load_pose(file).T_map_base.distance_to(IN_ROOM_1) < 0.1
     with Life(ros2, robot, file) as second:
         assert second.state is State.LOCALIZED
         assert second.pose.distance_to(IN_ROOM_1) < 0.1
-        assert second.reason.startswith("LOCALIZED: the saved pose said where; ")
+        assert second.reason.startswith("LOCALIZED: chosen by the saved pose; ")
         (line,) = [x for x in second.recorder.told(Severity.INFO) if x.startswith("the saved pose")]
         assert "carried on by odometry" in line
 
@@ -371,7 +370,7 @@ def test_a_robot_that_was_picked_up_has_no_saved_pose(ros2, file):
     robot = Speaker(ros2, identical_rooms(3), IN_ROOM_1)
     save_pose(file, saved(robot.world, 90.0, IN_ROOM_1, robot.T_odom_base))
     with Life(ros2, robot, file) as life:
-        life.hear(Heard.WHEEL_DROP, ros2.make("kobuki/WheelDropEvent", wheel=0, state=1))
+        life.receive(Channel.WHEEL_DROP, ros2.make("kobuki/WheelDropEvent", wheel=0, state=1))
         wait_for(lambda: not file.exists())
     assert not file.exists()
 
@@ -381,7 +380,7 @@ def test_initial_pose_decides_between_equal_rooms(ros2, tmp_path):
     asked = {"set_initial_pose": True, "initial_pose": IN_ROOM_1}
     with Life(ros2, robot, tmp_path / "pose.json", **asked) as life:
         assert life.pose.distance_to(IN_ROOM_1) < 0.1
-        assert life.reason.startswith("LOCALIZED: initial_pose said where; ")
+        assert life.reason.startswith("LOCALIZED: chosen by initial_pose; ")
 
 
 def test_a_node_goes_on_where_nothing_can_be_saved(ros2, hall_plan, tmp_path):

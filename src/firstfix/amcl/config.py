@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from enum import Enum
 
 from firstfix.core.errors import InputError
-from firstfix.core.se2 import SE2
 from firstfix.core.settings import check_settings, setting
 
 
@@ -30,7 +29,8 @@ class SensorModel(Enum):
 class AmclConfig:
     """All settings of the filter; the metadata of each field has its description and range.
 
-    The parameters of Nav2's AMCL are here under their own names. `model_unknown_space` is Beluga's,
+    Names and defaults are those of Nav2's AMCL. Its topics, frames and rates are parameters of the
+    node (`firstfix.ros.node_config`). `model_unknown_space` is Beluga's,
     `selective_resampling` that of AMCL for ROS 1.
 
     Raises
@@ -96,19 +96,6 @@ class AmclConfig:
     update_min_d: float = setting(0.25, "translation before an update, m", 0.0)
     update_min_a: float = setting(0.2, "rotation before an update, rad", 0.0)
     random_seed: int = setting(-1, "seed of all randomness; negative: 0, so that runs repeat", -1)
-
-    set_initial_pose: bool = setting(False, "start at initial_pose")
-    initial_pose: SE2 = setting(SE2.identity(), "pose of the base in the map at the start")
-    always_reset_initial_pose: bool = setting(False, "forget the last pose at every reset")
-    save_pose_rate: float = setting(0.5, "rate at which the pose is saved, Hz; -1: never", -1.0)
-    transform_tolerance: float = setting(1.0, "validity of map -> odom into the future, s", 0.0)
-    tf_broadcast: bool = setting(True, "publish map -> odom")
-    first_map_only: bool = setting(False, "ignore maps after the first")
-    base_frame_id: str = setting("base_footprint", "frame of the base")
-    odom_frame_id: str = setting("odom", "frame of the odometry")
-    global_frame_id: str = setting("map", "frame of the map")
-    scan_topic: str = setting("scan", "topic of the scans")
-    map_topic: str = setting("map", "topic of the map")
 
     @property
     def seed(self) -> int:

@@ -70,7 +70,7 @@ def bench_track(
     )
 
     found = find_cases(cases)
-    config = load_config(params, seed)
+    config = load_config(params, seed).localizer.amcl
     if json_file is not None:
         check_file(json_file)
     tasks = [TrackTask(case, config, config.seed) for case in found]

@@ -1,4 +1,4 @@
-"""The settings of the dynamic stage, as a command line gives them."""
+"""The parameters of filter and node, as a command line gives them."""
 
 from __future__ import annotations
 
@@ -7,34 +7,34 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from firstfix.amcl.config import AmclConfig
+    from firstfix.ros.node_config import NodeConfig
 
 
-def load_config(params: Path | None, seed: int | None) -> AmclConfig:
-    """Return the settings of a parameter file of Nav2, its defaults without one.
+def load_config(params: Path | None, seed: int | None) -> NodeConfig:
+    """Return the parameters in a file of Nav2, section ``amcl``; the defaults without a file.
 
     Parameters
     ----------
     params : Path or None
         The file.
     seed : int or None
-        Takes the place of random_seed where it is given.
+        Replaces random_seed where it is given.
 
     Returns
     -------
-    AmclConfig
-        The settings.
+    NodeConfig
+        The parameters.
 
     Raises
     ------
     InputError
         If the file cannot be used.
     """
-    from firstfix.amcl.config import AmclConfig
+    from firstfix.ros.node_config import NodeConfig
+    from firstfix.ros.parameters import load_node_config
 
-    config = AmclConfig()
-    if params is not None:
-        from firstfix.io.parameters.amcl_yaml import load_amcl_config
-
-        config = load_amcl_config(params)
-    return config if seed is None else replace(config, random_seed=seed)
+    config = NodeConfig() if params is None else load_node_config(params)
+    if seed is None:
+        return config
+    amcl = replace(config.localizer.amcl, random_seed=seed)
+    return replace(config, localizer=replace(config.localizer, amcl=amcl))

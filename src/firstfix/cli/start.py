@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from firstfix.amcl.config import AmclConfig
     from firstfix.core.grid import OccupancyGrid
     from firstfix.core.recording import Recording
+    from firstfix.ros.node_config import NodeConfig
 
 TRUTH = "truth"
 SEARCH = "search"
@@ -89,7 +89,7 @@ def read_start(text: str | None) -> SE2 | Path | str | None:
 
 
 def choose_start(
-    said: SE2 | Path | str | None, grid: OccupancyGrid, recording: Recording, config: AmclConfig
+    said: SE2 | Path | str | None, grid: OccupancyGrid, recording: Recording, config: NodeConfig
 ) -> Start:
     """Choose where to begin: what was said, else what the parameters say, else the truth.
 
@@ -101,7 +101,7 @@ def choose_start(
         The map.
     recording : Recording
         The log.
-    config : AmclConfig
+    config : NodeConfig
         set_initial_pose and initial_pose.
 
     Returns

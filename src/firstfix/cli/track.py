@@ -86,7 +86,8 @@ def track(
     from firstfix.io.logs.load import load_recording
     from firstfix.io.maps.map_server import load_map
 
-    config = load_config(params, seed)
+    parameters = load_config(params, seed)
+    config = parameters.localizer.amcl
     grid = load_map(map_path)
     recording = load_recording(log, topic=topic)
 
@@ -99,15 +100,15 @@ def track(
     from firstfix.lab.metrics.track_metrics import summarize_track
 
     known_odometry(recording)  # without it, no start would help
-    begin = choose_start(said, grid, recording, config)
+    begin = choose_start(said, grid, recording, parameters)
     for note in (*recording.notes, begin.note):
         typer.echo(f"note: {note}", err=True)
     keeper, key = None, ""
     if keep_pose is not None:
         from firstfix.io.saved_pose import map_key
-        from firstfix.ros.pose_keeper import PoseKeeper
+        from firstfix.ros.pose_memory import PoseKeeper
 
-        keeper, key = PoseKeeper(keep_pose, config.save_pose_rate), map_key(grid)
+        keeper, key = PoseKeeper(keep_pose, parameters.save_pose_rate), map_key(grid)
     if begin.origin is Origin.SEARCH:
         drive, tracked = _searched(recording, grid, config)
     else:

@@ -1,45 +1,42 @@
-"""Arguments as ROS 2 writes them: rules for names, parameters, files of parameters."""
+"""Arguments of ROS 2: remappings, parameters, parameter files."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
-from enum import Enum
 from pathlib import Path
 from typing import Any
 
 from firstfix.core.errors import InputError
-from firstfix.core.se2 import SE2
-from firstfix.io.parameters.amcl_yaml import load_amcl_config
+from firstfix.io.parameters.amcl_yaml import read_values
 from firstfix.io.parameters.ros_parameters import read_parameters
 from firstfix.io.safe_yaml import kind, load_mapping
 from firstfix.ros.names import Names
 from firstfix.ros.node_config import NodeConfig
-from firstfix.ros.parameters import configured, parameters
+from firstfix.ros.parameters import configured, defaults, parameters
 
 _NODE, _NAMESPACE = ("__node", "__name"), "__ns"
 
 
 def names_from(rules: Iterable[str], node: str, namespace: str) -> Names:
-    """Read rules for names.
+    """Read remapping rules.
 
     Parameters
     ----------
     rules : iterable of str
-        ``scan:=base_scan``, ``__ns:=/robot1``, ``__node:=finder``, and ``node:scan:=base_scan``,
-        which holds for the node of that name only.
+        ``scan:=base_scan``, ``__ns:=/robot1``, ``__node:=finder``, and ``node:scan:=base_scan``
+        for the node of that name only.
     node, namespace : str
-        Where no rule says otherwise; the leading slash of the namespace may be missing.
+        Used unless a rule sets them; the leading slash of the namespace may be missing.
 
     Returns
     -------
     Names
-        The place of the node.
+        Name, namespace and remappings of the node.
 
     Raises
     ------
     InputError
-        If a rule or a name is none.
+        If a rule or a name is invalid.
     """
     pairs = [_split(rule, "scan:=base_scan") for rule in rules]
     for old, new in pairs:
@@ -59,7 +56,7 @@ def settings_from(
     assignments: Iterable[str],
     options: Mapping[str, Any],
 ) -> NodeConfig:
-    """Read the settings of a node; what comes later in the list of parameters counts more.
+    """Read the parameters of a node; each source overrides those before it in this list.
 
     Parameters
     ----------
@@ -72,7 +69,7 @@ def settings_from(
     assignments : iterable of str
         ``mode:=full``.
     options : mapping of str to object
-        Parameters by name; None where one was not given.
+        Parameters by name; None is ignored.
 
     Returns
     -------
@@ -86,7 +83,7 @@ def settings_from(
     """
     values: dict[str, Any] = {}
     if amcl_file is not None:
-        values |= _amcl_values(amcl_file)
+        values |= read_values(amcl_file, "amcl", defaults())
     known = frozenset(parameter.name for parameter in parameters())
     for file in files:
         found = read_parameters(file, node, known)
@@ -107,18 +104,6 @@ def _split(rule: str, example: str) -> tuple[str, str]:
             remedy="write name:=value",
         )
     return left, right
-
-
-def _amcl_values(path: Path) -> dict[str, Any]:
-    config = load_amcl_config(path)
-    values: dict[str, Any] = {}
-    for entry in fields(config):
-        value = getattr(config, entry.name)
-        if isinstance(value, SE2):
-            values |= {f"{entry.name}.{part}": getattr(value, part) for part in ("x", "y", "yaw")}
-        else:
-            values[entry.name] = value.value if isinstance(value, Enum) else value
-    return values
 
 
 def _scalar(name: str, value: Any) -> bool | int | float | str:

@@ -1,4 +1,4 @@
-"""What a node hears and says, under which names; the same for every transport."""
+"""The topics and services of a node, the same for every transport."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from firstfix.ros.node_config import Mode, NodeConfig
 class Delivery(Enum):
     """Quality of service."""
 
-    SENSOR = "best effort, the newest"
+    SENSOR = "best effort"
     RELIABLE = "reliable"
-    LATCHED = "reliable, the last one also for those who come late"
-    LATCHED_MANY = "reliable, the last of each sender also for those who come late"
+    LATCHED = "reliable, latched"
+    LATCHED_MANY = "reliable, latched per publisher"
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Topic:
     type_name : str
         ``package/Type``; the transport knows the package of Kobuki's events.
     delivery : Delivery
-        How.
+        Quality of service.
     """
 
     name: str
@@ -36,8 +36,8 @@ class Topic:
     delivery: Delivery
 
 
-class Heard(Enum):
-    """What can be heard."""
+class Channel(Enum):
+    """Where a message came from: a topic, a service, or the program itself."""
 
     SCAN = "scan"
     MAP = "map"
@@ -60,58 +60,58 @@ INITIAL_POSE = Topic("initialpose", POSE_TYPE, Delivery.RELIABLE)
 AMCL_POSE = Topic("amcl_pose", POSE_TYPE, Delivery.LATCHED)
 TF = Topic("/tf", "tf2_msgs/TFMessage", Delivery.RELIABLE)
 PARTICLES = Topic("particle_cloud", "nav2_msgs/ParticleCloud", Delivery.SENSOR)
-# What rviz of ROS 1 can show, and what can be had where nav2_msgs is not installed.
+# RViz of ROS 1 can display this type, and it exists where nav2_msgs is not installed.
 PARTICLE_POSES = Topic("particle_cloud", "geometry_msgs/PoseArray", Delivery.SENSOR)
 HYPOTHESES = Topic("hypotheses", "geometry_msgs/PoseArray", Delivery.LATCHED)
 STATUS = Topic("localization_status", "diagnostic_msgs/DiagnosticArray", Delivery.LATCHED)
 
 
-def heard_topics(config: NodeConfig) -> dict[Heard, Topic]:
-    """Return what a node subscribes to.
+def subscribed_topics(config: NodeConfig) -> dict[Channel, Topic]:
+    """Return the topics that a node subscribes to.
 
     Parameters
     ----------
     config : NodeConfig
-        With the topics of scan and map.
+        Names the topics of scan and map.
 
     Returns
     -------
-    dict of Heard to Topic
-        Without what comes as a service.
+    dict of Channel to Topic
+        Services are not among them.
     """
     topics = {
-        Heard.SCAN: Topic(config.amcl.scan_topic, "sensor_msgs/LaserScan", Delivery.SENSOR),
-        Heard.TF: TF,
-        Heard.TF_STATIC: Topic("/tf_static", "tf2_msgs/TFMessage", Delivery.LATCHED_MANY),
-        Heard.ODOM: Topic("odom", "nav_msgs/Odometry", Delivery.SENSOR),
-        Heard.INITIAL_POSE: INITIAL_POSE,
-        Heard.CLIFF: Topic("events/cliff", "kobuki/CliffEvent", Delivery.RELIABLE),
-        Heard.WHEEL_DROP: Topic("events/wheel_drop", "kobuki/WheelDropEvent", Delivery.RELIABLE),
-        Heard.BUMPER: Topic("events/bumper", "kobuki/BumperEvent", Delivery.RELIABLE),
-        Heard.KIDNAPPED: Topic("kidnapped", "std_msgs/Bool", Delivery.RELIABLE),
+        Channel.SCAN: Topic(config.scan_topic, "sensor_msgs/LaserScan", Delivery.SENSOR),
+        Channel.TF: TF,
+        Channel.TF_STATIC: Topic("/tf_static", "tf2_msgs/TFMessage", Delivery.LATCHED_MANY),
+        Channel.ODOM: Topic("odom", "nav_msgs/Odometry", Delivery.SENSOR),
+        Channel.INITIAL_POSE: INITIAL_POSE,
+        Channel.CLIFF: Topic("events/cliff", "kobuki/CliffEvent", Delivery.RELIABLE),
+        Channel.WHEEL_DROP: Topic("events/wheel_drop", "kobuki/WheelDropEvent", Delivery.RELIABLE),
+        Channel.BUMPER: Topic("events/bumper", "kobuki/BumperEvent", Delivery.RELIABLE),
+        Channel.KIDNAPPED: Topic("kidnapped", "std_msgs/Bool", Delivery.RELIABLE),
     }
     if not config.yaml_filename:
-        map_topic = Topic(config.amcl.map_topic, "nav_msgs/OccupancyGrid", Delivery.LATCHED)
-        topics[Heard.MAP] = map_topic
+        map_topic = Topic(config.map_topic, "nav_msgs/OccupancyGrid", Delivery.LATCHED)
+        topics[Channel.MAP] = map_topic
     return topics
 
 
-def said_topics(config: NodeConfig, particles: Topic) -> tuple[Topic, ...]:
-    """Return what a node publishes in its mode.
+def published_topics(config: NodeConfig, particles: Topic) -> tuple[Topic, ...]:
+    """Return the topics that a node advertises in its mode.
 
     Parameters
     ----------
     config : NodeConfig
-        With the mode.
+        Has the mode.
     particles : Topic
-        How the transport publishes clouds.
+        The topic on which the transport publishes particle clouds.
 
     Returns
     -------
     tuple of Topic
-        To be advertised at the start.
+        All of them.
     """
     if config.mode is Mode.BOOTSTRAP:
         return INITIAL_POSE, HYPOTHESES, STATUS
-    moved = [TF] if config.amcl.tf_broadcast else []
+    moved = [TF] if config.tf_broadcast else []
     return (AMCL_POSE, particles, HYPOTHESES, STATUS, *moved)

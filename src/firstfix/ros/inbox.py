@@ -1,4 +1,4 @@
-"""Between the callbacks of a transport and the one thread that thinks."""
+"""The queue between the callbacks of a transport and the worker thread."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Item = TypeVar("Item")
 
 
 class Inbox(Generic[Item]):
-    """What callbacks hand in, until a worker takes it: the newest scan wins, nothing else is lost.
+    """A queue that keeps everything but scans, of which it keeps the newest.
 
     Callbacks never wait for the worker.
     """
@@ -27,19 +27,19 @@ class Inbox(Generic[Item]):
         return self._is_closed
 
     def put(self, item: Item) -> None:
-        """Hand in something that must not be lost."""
+        """Queue an item that must not be lost."""
         with self._changed:
             self._kept.append(item)
             self._changed.notify()
 
     def put_scan(self, item: Item) -> None:
-        """Hand in a scan; one that the worker has not taken yet is given up for it."""
+        """Queue a scan in place of one that the worker has not taken yet."""
         with self._changed:
             self._scan = item
             self._changed.notify()
 
     def take(self, timeout_s: float) -> list[Item]:
-        """Wait until there is something, and take all.
+        """Wait for items, and take all of them.
 
         Parameters
         ----------
@@ -49,10 +49,10 @@ class Inbox(Generic[Item]):
         Returns
         -------
         list
-            In the order in which it came, the scan last; empty if nothing came, or after `close`.
+            In the order of arrival, the scan last; empty after the timeout and after `close`.
         """
         with self._changed:
-            self._changed.wait_for(self._has_news, timeout_s)
+            self._changed.wait_for(self._has_items, timeout_s)
             if self._is_closed:
                 return []
             items = [*self._kept]
@@ -63,10 +63,10 @@ class Inbox(Generic[Item]):
             return items
 
     def close(self) -> None:
-        """Let the worker go home."""
+        """End the wait of the worker; from now on `take` returns nothing."""
         with self._changed:
             self._is_closed = True
             self._changed.notify()
 
-    def _has_news(self) -> bool:
+    def _has_items(self) -> bool:
         return self._is_closed or bool(self._kept) or self._scan is not None

@@ -14,7 +14,7 @@ _NAMESPACE = re.compile(rf"(/|(/{_TOKEN})+)")
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """The place of a node among the names of a robot.
+    """Name, namespace and remappings of a node.
 
     Parameters
     ----------
@@ -23,12 +23,12 @@ class Names:
     namespace : str
         With a leading slash.
     rules : tuple of tuple of str
-        Which name becomes which; the first rule that fits counts.
+        Remappings; the first that matches is used.
 
     Raises
     ------
     InputError
-        If a name is none.
+        If a name is invalid.
     """
 
     node: str = "firstfix"

@@ -1,4 +1,4 @@
-"""A node without its transport: hear, think in a thread of its own, say."""
+"""A node without its transport: callbacks queue messages, one worker thread localizes."""
 
 from __future__ import annotations
 
@@ -15,12 +15,11 @@ from firstfix.core.scan import LaserScan
 from firstfix.fields.cache import cache_folder
 from firstfix.global_localization.searchable import check_searchable
 from firstfix.io.maps.map_server import load_map
-from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Output
 from firstfix.localizer.precompile import precompile
-from firstfix.ros.channels import Heard, heard_topics
+from firstfix.ros.channels import Channel, subscribed_topics
 from firstfix.ros.inbox import Inbox
 from firstfix.ros.message_converter import MessageConverter
 from firstfix.ros.node_config import NodeConfig
@@ -30,25 +29,25 @@ from firstfix.ros.transport import Severity, Transport
 
 Watcher = Callable[[Input, list[Output], Localizer], None]
 
-# One sentence on one subject is said that often at most.
+# A warning on one subject is repeated after this time at the earliest, s.
 _REPEAT_S = 10.0
-# How often the worker looks what is missing, s.
-_LOOK_S = 5.0
-# The end does not wait longer than that for a thought, such as the compiler's, s.
-_END_S = 3.0
+# A topic that is silent for this time is reported, s.
+_SILENCE_S = 5.0
+# `stop` waits for the worker this long: it may be in the compiler, s.
+_STOP_S = 3.0
 
 
 class Node:
-    """The localizer of a robot, fed by callbacks of any thread.
+    """The localizer of a robot; callbacks of any thread feed it.
 
     Parameters
     ----------
     config : NodeConfig
-        Settings.
+        Parameters.
     transport : Transport
-        What messages are made with and sent to; called from the worker only.
+        Makes and sends messages; called from the worker only.
     watchers : sequence of Watcher
-        Who else is told what came in and what it led to, such as the live page; from the worker.
+        Called by the worker with each input and its outputs, such as the live page.
     """
 
     def __init__(
@@ -57,105 +56,101 @@ class Node:
         self._config = config
         self._transport = transport
         self._watchers = watchers
-        self._inbox: Inbox[tuple[Heard, Any]] = Inbox()
-        self._intake = MessageConverter(config.amcl, self.complain)
-        self._announcer = OutputPublisher(config, transport)
+        self._inbox: Inbox[tuple[Channel, Any]] = Inbox()
+        self._converter = MessageConverter(config, self.warn_throttled)
+        self._publisher = OutputPublisher(config, transport)
         self._memory = PoseMemory(config, transport.log)
-        self._localizer = Localizer(LocalizerConfig(amcl=config.amcl), cache_folder())
-        self._said_at: dict[str, float] = {}
-        self._heard: set[Heard] = set()
-        self.misses_since = math.inf  # when topics were last missed; inf: nobody passes them on
-        self._own_map: NewMap | None = None
+        self._localizer = Localizer(config.localizer, cache_folder())
+        self._map: NewMap | None = None  # of yaml_filename, then the one in use
+        self._logged_at: dict[str, float] = {}
+        self._received: set[Channel] = set()
+        self.expects_topics_since = math.inf  # infinite while the transport passes nothing on
         self._worker = threading.Thread(target=self._work, name="firstfix", daemon=True)
 
     def start(self) -> None:
-        """Begin to think; kernels and map are made ready first.
+        """Start the worker; it prepares kernels and map first.
 
         Raises
         ------
         InputError
-            If the file of the map cannot be used.
+            If the map file cannot be used.
         """
         if self._config.yaml_filename:
             grid = load_map(Path(self._config.yaml_filename))
             check_searchable(grid)
-            self._own_map = NewMap(0.0, grid)
-        self.misses_since = time.monotonic()
+            self._map = NewMap(0.0, grid)
+        self.expects_topics_since = time.monotonic()
         self._worker.start()
 
     def stop(self) -> None:
-        """End, after what is being thought now, unless that takes long."""
+        """Stop the worker after the message that it is handling, unless that takes long."""
         self._inbox.close()
         if self._worker.is_alive():
-            self._worker.join(_END_S)
+            self._worker.join(_STOP_S)
 
-    def hear(self, heard: Heard, message: Any = None) -> None:
-        """Take in a message or a request; returns at once.
+    def receive(self, channel: Channel, message: Any = None) -> None:
+        """Queue a message or a request; returns at once.
 
         Parameters
         ----------
-        heard : Heard
-            What it is.
+        channel : Channel
+            Where it came from.
         message : message
             None for a request.
         """
-        is_scan = heard is Heard.SCAN or isinstance(message, LaserScan)
+        is_scan = channel is Channel.SCAN or isinstance(message, LaserScan)
         put = self._inbox.put_scan if is_scan else self._inbox.put
-        put((heard, message))
+        put((channel, message))
 
     def give(self, given: Input) -> None:
-        """Take in what needs no conversion, such as the word of a person on the live page.
+        """Queue an input that needs no conversion, such as a hint from the live page."""
+        self.receive(Channel.INPUT, given)
 
-        Parameters
-        ----------
-        given : Input
-            What happened.
-        """
-        self.hear(Heard.INPUT, given)
-
-    def complain(self, subject: str, text: str, gravity: Severity = Severity.WARNING) -> None:
-        """Write a warning, unless there was one on this subject a moment ago.
+    def warn_throttled(
+        self, subject: str, text: str, severity: Severity = Severity.WARNING
+    ) -> None:
+        """Write a line to the log, unless this subject had one less than 10 s ago.
 
         Parameters
         ----------
         subject : str
-            What it is about.
+            The key of the rate limit.
         text : str
-            For people.
-        gravity : Severity, optional
-            How grave it is.
+            One sentence for people.
+        severity : Severity, optional
+            Of the line.
         """
         now = time.monotonic()
-        if now - self._said_at.get(subject, -_REPEAT_S) >= _REPEAT_S:
-            self._said_at[subject] = now
-            self._transport.log(gravity, text)
+        if now - self._logged_at.get(subject, -_REPEAT_S) >= _REPEAT_S:
+            self._logged_at[subject] = now
+            self._transport.log(severity, text)
 
     def _work(self) -> None:
-        self._try(self._make_ready)
+        self._try(self._prepare)
         while not self._inbox.is_closed:
-            self._take_all(self._inbox.take(_LOOK_S))
-            if time.monotonic() - self.misses_since >= _LOOK_S:
-                self._say_what_is_missing()
+            self._take_all(self._inbox.take(_SILENCE_S))
+            if time.monotonic() - self.expects_topics_since >= _SILENCE_S:
+                self._report_silent_topics()
         self._try(self._memory.close)
 
-    def _make_ready(self) -> None:
-        precompile(self._config.amcl)
-        if self._own_map is not None:
-            self._give(self._intake.use_map(self._own_map))
+    def _prepare(self) -> None:
+        precompile(self._config.localizer.amcl)
+        if self._map is not None:
+            self._handle_all(self._converter.use_map(self._map))
 
-    def _take_all(self, items: list[tuple[Heard, Any]]) -> None:
-        for heard, message in items:
+    def _take_all(self, items: list[tuple[Channel, Any]]) -> None:
+        for channel, message in items:
             if self._inbox.is_closed:
                 return
-            self._heard.add(Heard.SCAN if isinstance(message, LaserScan) else heard)
-            self._try(self._take, heard, message)
+            self._received.add(Channel.SCAN if isinstance(message, LaserScan) else channel)
+            self._try(self._take, channel, message)
 
-    def _take(self, heard: Heard, message: Any) -> None:
-        if heard is Heard.INITIAL_POSE and self._announcer.is_own(message):
+    def _take(self, channel: Channel, message: Any) -> None:
+        if channel is Channel.INITIAL_POSE and self._publisher.is_own(message):
             return
-        self._give(self._intake.take(heard, message))
+        self._handle_all(self._converter.convert(channel, message))
 
-    def _give(self, inputs: list[Input]) -> None:
+    def _handle_all(self, inputs: list[Input]) -> None:
         for given in inputs:
             self._handle(given)
             hint = self._memory.hint_after(given)
@@ -166,35 +161,56 @@ class Node:
         try:
             outputs = self._localizer.handle(given)
         except MapError:
-            self._intake.take_back_map()
+            self._converter.restore_map()
             raise
-        self._announcer.announce(outputs, self._localizer.particles)
+        except InputError:
+            raise
+        except Exception:
+            self._replace_localizer(given)
+            raise
+        if isinstance(given, NewMap):
+            self._map = given
+        self._publish(given, outputs)
+
+    def _replace_localizer(self, given: Input) -> None:
+        """Start over on the same map: an exception may have left the localizer half-changed."""
+        self._localizer = Localizer(self._config.localizer, cache_folder())
+        text = "the localizer failed and was reset: searching the whole map again"
+        self.warn_throttled("reset", text, Severity.ERROR)
+        if isinstance(given, NewMap):
+            self._converter.restore_map()
+        if self._map is not None:
+            known = NewMap(given.stamp, self._map.grid)
+            self._publish(known, self._localizer.handle(known))
+
+    def _publish(self, given: Input, outputs: list[Output]) -> None:
+        self._publisher.publish(outputs, self._localizer.particles)
         self._memory.keep(outputs)
         for watch in self._watchers:
             watch(given, outputs, self._localizer)
 
-    def _try(self, step: Any, *given: Any) -> None:
-        """Do something that must not end the node, whatever came over the wire."""
+    def _try(self, step: Callable[..., None], *given: Any) -> None:
+        """Run a step; whatever a message contains, it must not end the node."""
         try:
             step(*given)
         except InputError as error:
-            # Not by its text, which may have another number each time.
-            self.complain(f"{type(error).__name__} {given[:1]}", f"{error}")
-        except Exception:  # noqa: BLE001 - a node that died silently would be worse
+            # The key is not the text, which may contain another number each time.
+            self.warn_throttled(f"{type(error).__name__} {given[:1]}", f"{error}")
+        except Exception:  # noqa: BLE001 - a worker that ends silently would be worse
             text = f"an error of firstfix itself:\n{traceback.format_exc()}"
-            self.complain("error", text, Severity.ERROR)
+            self.warn_throttled("error", text, Severity.ERROR)
 
-    def _say_what_is_missing(self) -> None:
-        """Name the topics that were silent since the last look; whether others spoke or not."""
-        self.misses_since = time.monotonic()
-        topics = heard_topics(self._config)
-        for heard in (Heard.MAP, Heard.SCAN):
-            if heard in topics and heard not in self._heard:
-                topic = topics[heard]
-                text = f"nothing heard on {topic.name} ({topic.type_name}) for {_LOOK_S:.0f} s"
-                self.complain(heard.value, text)
-        # A map is told once; what is wrong with odometry, every scan tells.
-        self._heard &= {Heard.MAP}
+    def _report_silent_topics(self) -> None:
+        """Name the topics without a message since the last report."""
+        self.expects_topics_since = time.monotonic()
+        topics = subscribed_topics(self._config)
+        for channel in (Channel.MAP, Channel.SCAN):
+            if channel in topics and channel not in self._received:
+                topic = topics[channel]
+                text = f"no message on {topic.name} ({topic.type_name}) for {_SILENCE_S:.0f} s"
+                self.warn_throttled(channel.value, text)
+        # A map comes once. Missing odometry is reported with each scan.
+        self._received &= {Channel.MAP}
 
 
 MakeNode = Callable[[NodeConfig, Transport], Node]

@@ -1,4 +1,4 @@
-"""Outputs to ROS messages: who is told what, and how often."""
+"""Outputs of the localizer to ROS messages, each at its rate."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ from firstfix.ros.channels import AMCL_POSE, HYPOTHESES, INITIAL_POSE, STATUS, T
 from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.transport import Severity, Transport
 
-# Of these some may still be on their way back to here.
+# So many of the own poses may still be on their way back through the topic.
 _OWN_POSES = 10
-# A robot that is not found says why in the log that often, s.
+# The log repeats the reason this often while the robot is not localized, s.
 _REMIND_S = 10.0
 
 _LEVELS = {
@@ -46,20 +46,20 @@ _LEVELS = {
 
 
 class OutputPublisher:
-    """Publishes what a localizer has to say.
+    """Publishes the outputs of a localizer.
 
     Parameters
     ----------
     config : NodeConfig
         Mode, frames, rates.
     transport : Transport
-        Where to.
+        Makes and sends the messages.
     """
 
     def __init__(self, config: NodeConfig, transport: Transport) -> None:
         self._config = config
         self._transport = transport
-        self._map = config.amcl.global_frame_id
+        self._map = config.global_frame_id
         self._state: State | None = None
         self._status_at = -math.inf
         self._logged_at = -math.inf
@@ -67,70 +67,70 @@ class OutputPublisher:
         self._motion: MotionRequest | None = None
         self._places = 0
         self._own_poses: deque[StampedTransform] = deque(maxlen=_OWN_POSES)
-        self._pose_listeners = 0
+        self._pose_subscribers = 0
 
-    def announce(self, outputs: list[Output], particles: Particles | None) -> None:
+    def publish(self, outputs: list[Output], particles: Particles | None) -> None:
         """Publish.
 
         Parameters
         ----------
         outputs : list of Output
-            Of one input.
+            Those of one input.
         particles : Particles or None
-            The belief now.
+            The particles now.
         """
         if any(isinstance(output, Hypotheses) for output in outputs):
-            # Before the status, which tells of it.
+            # Before the status, which contains it.
             self._motion = next((o for o in outputs if isinstance(o, MotionRequest)), None)
         for output in outputs:
             if isinstance(output, InitialPose):
                 if self._config.mode is Mode.BOOTSTRAP:
-                    self._announce_initial(output)
+                    self._publish_initial(output)
             elif isinstance(output, TrackedPose):
-                self._announce_tracked(output, particles)
+                self._publish_tracked(output, particles)
             elif isinstance(output, Hypotheses):
-                self._announce_places(output.stamp, [place.pose for place in output.places])
+                self._publish_places(output.stamp, [place.pose for place in output.places])
             elif isinstance(output, Status):
-                self._announce_status(output)
+                self._publish_status(output)
 
     def is_own(self, message: Any) -> bool:
-        """Tell whether an initial pose that was heard is one that was published here."""
+        """Return whether an initial pose was published here."""
         return to_pose(message) in self._own_poses
 
-    def _announce_initial(self, found: InitialPose | TrackedPose) -> None:
+    def _publish_initial(self, found: InitialPose | TrackedPose) -> None:
         """Hand a pose over to the AMCL that runs beside."""
         message = self._pose_message(found)
         self._own_poses.append(to_pose(message))
-        self._pose_listeners = self._transport.listeners(INITIAL_POSE)
+        self._pose_subscribers = self._transport.subscriber_count(INITIAL_POSE)
         self._transport.publish(INITIAL_POSE, message)
 
     def _pose_message(self, at: InitialPose | TrackedPose) -> Any:
         make = self._transport.make
         return pose_with_covariance(make, at.stamp, self._map, at.T_map_base, at.covariance)
 
-    def _announce_tracked(self, tracked: TrackedPose, particles: Particles | None) -> None:
+    def _publish_tracked(self, tracked: TrackedPose, particles: Particles | None) -> None:
         if self._config.mode is Mode.BOOTSTRAP:
-            before, self._pose_listeners = (
-                self._pose_listeners,
-                self._transport.listeners(INITIAL_POSE),
+            before, self._pose_subscribers = (
+                self._pose_subscribers,
+                self._transport.subscriber_count(INITIAL_POSE),
             )
-            if self._pose_listeners > before:
-                self._announce_initial(tracked)  # to an AMCL that came late
+            if self._pose_subscribers > before:
+                self._publish_initial(tracked)  # to an AMCL that started later
             return
-        make, amcl, stamp = self._transport.make, self._config.amcl, tracked.stamp
+        make, config, stamp = self._transport.make, self._config, tracked.stamp
         self._transport.publish(AMCL_POSE, self._pose_message(tracked))
-        if amcl.tf_broadcast:
-            # Dated ahead, as AMCL does it, so that it holds until the next one.
-            until = stamp + amcl.transform_tolerance
+        if config.tf_broadcast:
+            # Stamped ahead, as in AMCL, so that it is valid until the next one.
+            until = stamp + config.transform_tolerance
             T = tracked.T_map_odom
-            self._transport.publish(TF, transforms(make, until, self._map, amcl.odom_frame_id, T))
+            self._transport.publish(TF, transforms(make, until, self._map, config.odom_frame_id, T))
         if particles is not None:
-            self._announce_particles(stamp, particles)
+            self._publish_particles(stamp, particles)
 
-    def _announce_particles(self, stamp: float, particles: Particles) -> None:
+    def _publish_particles(self, stamp: float, particles: Particles) -> None:
         rate, topic = self._config.cloud_rate, self._transport.particles
         is_due = rate > 0.0 and _is_due(stamp, self._cloud_at, 1.0 / rate)
-        if not is_due or not self._transport.listeners(topic):
+        if not is_due or not self._transport.subscriber_count(topic):
             return
         self._cloud_at = stamp
         make, poses = self._transport.make, particles.poses()
@@ -140,14 +140,14 @@ class OutputPublisher:
             cloud = particle_cloud(make, stamp, self._map, poses, particles.weight)
         self._transport.publish(topic, cloud)
 
-    def _announce_places(self, stamp: float, poses: list[SE2]) -> None:
+    def _publish_places(self, stamp: float, poses: list[SE2]) -> None:
         self._places = len(poses)
         message = pose_array(self._transport.make, stamp, self._map, poses)
         self._transport.publish(HYPOTHESES, message)
 
-    def _announce_status(self, status: Status) -> None:
+    def _publish_status(self, status: Status) -> None:
         if self._places and status.state is not State.DISAMBIGUATING:
-            self._announce_places(status.stamp, [])  # there is one place now, or none
+            self._publish_places(status.stamp, [])  # one place is left, or none
             self._motion = None
         has_changed = status.state is not self._state
         is_lost = status.state in (State.SEARCHING, State.DISAMBIGUATING)
@@ -182,5 +182,5 @@ class OutputPublisher:
 
 
 def _is_due(stamp: float, last: float, pause_s: float) -> bool:
-    """Tell whether a pause is over, or the clock was set back."""
+    """Return whether a pause is over; also if the clock was set back."""
     return not 0.0 <= stamp - last < pause_s

@@ -1,25 +1,30 @@
-"""The settings of a node as flat parameters, the way ROS has them."""
+"""The parameters of a node, flat as in ROS, generated from the dataclasses that hold them."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import Field, dataclass, fields
 from enum import Enum
+from pathlib import Path
 from typing import Any
 
-from firstfix.amcl.config import AmclConfig
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
-from firstfix.io.parameters.amcl_yaml import DEFAULTS, IGNORED, amcl_config, choices
+from firstfix.io.parameters.amcl_yaml import IGNORED, choices, read_values
 from firstfix.io.parameters.ros1_amcl import ros1_remedy
 from firstfix.io.ros_messages.incoming import to_frame
 from firstfix.io.saved_pose import MAX_POSITION_M
+from firstfix.localizer.config import LocalizerConfig
 from firstfix.ros.node_config import NodeConfig
 
-_OWN = {entry.name: entry.default for entry in fields(NodeConfig) if entry.name != "amcl"}
-_KNOWN = _OWN | DEFAULTS
+_POSE_PARTS = ("x", "y", "yaw")
 _FRAMES = ("base_frame_id", "odom_frame_id", "global_frame_id")
+# The filter's parameters have no prefix: users know them by Nav2's names.
+_NODE, _FILTER = "node", "amcl"
+# The localizer of a node injects no random particles.
+_WITHOUT_EFFECT = ("recovery_alpha_slow", "recovery_alpha_fast")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +38,11 @@ class Parameter:
     default : bool, int, float or str
         Its default; its type is that of the parameter.
     description : str
-        What it means.
+        Its meaning and unit.
     least, most : float
         Range of a number.
     choices : tuple of str
-        What a text may be; empty if anything.
+        The words that a text may be; empty for any text.
     """
 
     name: str
@@ -49,22 +54,18 @@ class Parameter:
 
 
 def parameters() -> tuple[Parameter, ...]:
-    """Return all parameters of a node: its own, and those of AMCL under Nav2's names."""
+    """Return all parameters: the node's, the filter's, and those of each other algorithm."""
     listed: list[Parameter] = []
-    for owner in (NodeConfig, AmclConfig):
-        for entry in fields(owner):
-            if "description" not in entry.metadata:
-                continue
-            text, default = entry.metadata["description"], entry.default
-            limits = entry.metadata["least"], entry.metadata["most"]
-            if isinstance(default, SE2):
-                parts = (f"{entry.name}.{part}" for part in ("x", "y", "yaw"))
-                listed += [Parameter(name, 0.0, text, *limits) for name in parts]
-            elif isinstance(default, Enum):
-                named = tuple(choice.value for choice in type(default))
-                listed.append(Parameter(entry.name, default.value, text, *limits, named))
-            else:
-                listed.append(Parameter(entry.name, default, text, *limits))
+    for _, name, entry in _entries():
+        text, default = entry.metadata["description"], entry.default
+        limits = entry.metadata["least"], entry.metadata["most"]
+        if isinstance(default, SE2):
+            listed += [Parameter(f"{name}.{part}", 0.0, text, *limits) for part in _POSE_PARTS]
+        elif isinstance(default, Enum):
+            words = tuple(choice.value for choice in type(default))
+            listed.append(Parameter(name, default.value, text, *limits, words))
+        else:
+            listed.append(Parameter(name, default, text, *limits))
     return tuple(listed)
 
 
@@ -80,50 +81,127 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def configured(values: Mapping[str, Any]) -> NodeConfig:
-    """Make the settings of a node from parameters.
+    """Make the config of a node from parameters.
 
     Parameters
     ----------
     values : mapping of str to object
-        By dotted names; what is missing keeps its default. Parameters that every node of ROS has,
-        such as ``use_sim_time``, are passed over.
+        By dotted names; a missing one keeps its default. Parameters that every ROS node has, such
+        as ``use_sim_time``, are ignored.
 
     Returns
     -------
     NodeConfig
-        The settings.
+        The config.
 
     Raises
     ------
     InputError
-        If a name is unknown, or a value has the wrong type or is out of its range.
+        If a name is unknown, a value has the wrong type or is out of its range, or a parameter has
+        no effect in a node.
     """
-    own: dict[str, Any] = {}
-    amcl: dict[str, Any] = {}
-    for name, value in values.items():
-        if name.partition(".")[0] not in IGNORED:
-            (own if name in _OWN else amcl)[name] = _typed(name, value)
-    return NodeConfig(amcl=amcl_config(amcl), **own)
+    config = _config(values)
+    for name in _WITHOUT_EFFECT:
+        if getattr(config.localizer.amcl, name) > 0.0:
+            raise InputError(
+                expected=f"{name} of 0: a node recovers by searching the whole map for the scan, "
+                "not by random particles",
+                received=f"{getattr(config.localizer.amcl, name)}",
+                remedy="remove it",
+            )
+    return config
+
+
+def _config(values: Mapping[str, Any]) -> NodeConfig:
+    given = {
+        name: _typed(name, value)
+        for name, value in values.items()
+        if name.partition(".")[0] not in IGNORED
+    }
+    sections: dict[str, dict[str, Any]] = {}
+    for section, name, entry in _entries():
+        own = sections.setdefault(section, {})
+        if isinstance(entry.default, SE2):
+            own[entry.name] = SE2(*(given.get(f"{name}.{part}", 0.0) for part in _POSE_PARTS))
+        elif name in given:
+            own[entry.name] = given[name]
+    node = sections.pop(_NODE)
+    algorithms = {name: owner(**sections[name]) for name, owner in _algorithms().items()}
+    return NodeConfig(localizer=LocalizerConfig(**algorithms), **node)
+
+
+def load_node_config(path: str | os.PathLike[str], section: str = "amcl") -> NodeConfig:
+    """Read the parameters of one node from a ROS 2 parameter file, for use without a node.
+
+    Parameters
+    ----------
+    path : path-like
+        The YAML, such as ``nav2_params.yaml``.
+    section : str, optional
+        Name of the node in the file.
+
+    Returns
+    -------
+    NodeConfig
+        With the defaults for what the file does not set.
+
+    Raises
+    ------
+    InputError
+        If the file has no section for this node or more than one, a name is unknown, or a value
+        cannot be used.
+    """
+    try:
+        return _config(read_values(Path(path), section, defaults()))
+    except InputError as error:
+        if str(path) in error.expected:
+            raise
+        raise InputError(
+            expected=f"{error.expected} in {path}", received=error.received, remedy=error.remedy
+        ) from error
+
+
+def defaults() -> dict[str, Any]:
+    """Return the default of every parameter by its name, and of Nav2's ``initial_pose.z``."""
+    known: dict[str, Any] = {}
+    for _, name, entry in _entries():
+        if isinstance(entry.default, SE2):
+            known |= {f"{name}.{part}": 0.0 for part in (*_POSE_PARTS, "z")}
+        else:
+            known[name] = entry.default
+    return known
+
+
+def _algorithms() -> dict[str, Any]:
+    """Return the config class of each algorithm by its name in `LocalizerConfig`."""
+    return {entry.name: entry.default_factory for entry in fields(LocalizerConfig)}
+
+
+def _entries() -> Iterator[tuple[str, str, Field[Any]]]:
+    """Return each setting with its section and its flat name, in the order of the documents."""
+    owners = {_NODE: NodeConfig, _FILTER: _algorithms()[_FILTER]} | _algorithms()
+    for section, owner in owners.items():
+        prefix = "" if section in (_NODE, _FILTER) else f"{section}."
+        for entry in fields(owner):
+            if "description" in entry.metadata:
+                yield section, prefix + entry.name, entry
 
 
 def _typed(name: str, value: Any) -> Any:
-    """Return a value as the settings have it; ranges are checked there."""
-    if name not in _KNOWN:
-        near = difflib.get_close_matches(name, _KNOWN, 1)
-        remedy = ros1_remedy(name, str(value)) or (
-            f"the nearest is {near[0]}" if near else "remove it"
-        )
-        raise InputError(expected="parameters of firstfix", received=name, remedy=remedy)
-    default = _KNOWN[name]
-    if isinstance(default, Enum):
-        listed = choices(default)
-        if not isinstance(value, str) or value not in listed:
+    """Return a value in the type of its setting; the dataclasses check its range."""
+    known = defaults()
+    if name not in known:
+        raise _unknown(name, value, known)
+    default = known[name]
+    if isinstance(default, Enum) and not isinstance(value, Enum):
+        words = choices(default)
+        if not isinstance(value, str) or value not in words:
             raise InputError(
-                expected=f"{name} as one of {', '.join(listed)}",
+                expected=f"{name} as one of {', '.join(words)}",
                 received=f"{value!r:.60}",
                 remedy=f"the default is {default.value}",
             )
-        return listed[value]
+        return words[value]
     is_number = type(value) in (int, float) and abs(value) <= MAX_POSITION_M
     if name.startswith("initial_pose.") and not is_number:
         raise InputError(
@@ -132,3 +210,9 @@ def _typed(name: str, value: Any) -> Any:
             remedy="write metres and radians",
         )
     return to_frame(value) if name in _FRAMES and isinstance(value, str) else value
+
+
+def _unknown(name: str, value: Any, known: Mapping[str, Any]) -> InputError:
+    near = difflib.get_close_matches(name, known, 1)
+    remedy = ros1_remedy(name, str(value)) or (f"the nearest is {near[0]}" if near else "remove it")
+    return InputError(expected="parameters of firstfix", received=name, remedy=remedy)

@@ -1,4 +1,4 @@
-"""What a node needs of the world: ROS 1, ROS 2 and plain DDS each are one."""
+"""What a node needs from ROS 1, ROS 2 or plain DDS."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from firstfix.ros.channels import Topic
 
 
 class Severity(Enum):
-    """How grave a line of the log is; the values are the methods of ROS 2's loggers."""
+    """Severity of a log line; the values are the methods of ROS 2's loggers."""
 
     INFO = "info"
     WARNING = "warning"
@@ -20,7 +20,7 @@ class Transport(Protocol):
     """Makes messages, publishes them, and writes the log."""
 
     particles: Topic
-    """How clouds of particles are published here."""
+    """The topic of particle clouds."""
 
     def make(self, type_name: str, /, **fields: Any) -> Any:
         """Build a message of ``package/Type`` from all its fields."""
@@ -28,8 +28,8 @@ class Transport(Protocol):
     def publish(self, topic: Topic, message: Any) -> None:
         """Send a message."""
 
-    def listeners(self, topic: Topic) -> int:
-        """Count those who listen."""
+    def subscriber_count(self, topic: Topic) -> int:
+        """Count the subscribers of a topic."""
 
-    def log(self, gravity: Severity, text: str) -> None:
+    def log(self, severity: Severity, text: str) -> None:
         """Write a line for people."""

@@ -12,7 +12,7 @@ from firstfix.core.scan import Mounting
 from firstfix.core.se2 import SE2
 from firstfix.io.ros_messages.incoming import StampedTransform
 from firstfix.io.ros_messages.robot_frames import RobotFrames
-from firstfix.io.ros_messages.tf_buffer import NotKnown
+from firstfix.io.ros_messages.tf_buffer import LookupFailure
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 
@@ -32,63 +32,63 @@ def frames():
 
 
 def told(frames):
-    return [(each.stamp, each.T_odom_base.x) for each in frames.news()]
+    return [(each.stamp, each.T_odom_base.x) for each in frames.new_odometry()]
 
 
 # ---- odometry by tf
 
 
 def test_at_the_start_nothing_is_known(frames):
-    assert isinstance(frames.reach, NotKnown)
-    assert frames.news() == []
+    assert isinstance(frames.reach, LookupFailure)
+    assert frames.new_odometry() == []
     assert frames.odometry_at(1.0) == []
-    assert frames.told_until == -math.inf
-    assert isinstance(frames.laser_at("laser", 1.0), NotKnown)
+    assert frames.known_until == -math.inf
+    assert isinstance(frames.laser_at("laser", 1.0), LookupFailure)
 
 
 def test_each_transform_tells_odometry_once(frames):
     for stamp in (1.0, 1.02, 1.04):
-        assert frames.move([driven(stamp)]) == 0.0
-        assert frames.news() == [Odometry(stamp, SE2(stamp, 0.0, 0.0))]
-        assert frames.news() == []
-        assert (frames.reach, frames.told_until) == (stamp, stamp)
+        assert frames.add_moving([driven(stamp)]) == 0.0
+        assert frames.new_odometry() == [Odometry(stamp, SE2(stamp, 0.0, 0.0))]
+        assert frames.new_odometry() == []
+        assert (frames.reach, frames.known_until) == (stamp, stamp)
 
 
 def test_other_transforms_tell_nothing(frames):
-    frames.move([driven(1.0)])
-    frames.news()
-    frames.move([driven(2.0, "base", "wheel"), driven(2.0, "map", "odom")])
-    assert frames.news() == []
+    frames.add_moving([driven(1.0)])
+    frames.new_odometry()
+    frames.add_moving([driven(2.0, "base", "wheel"), driven(2.0, "map", "odom")])
+    assert frames.new_odometry() == []
 
 
 def test_of_two_moving_links_the_slower_one_sets_the_pace(frames):
-    frames.move([driven(1.0, "odom", "mid"), driven(1.0, "mid", "base")])
+    frames.add_moving([driven(1.0, "odom", "mid"), driven(1.0, "mid", "base")])
     assert told(frames) == [(1.0, 2.0)]
-    frames.move([driven(2.0, "odom", "mid")])
+    frames.add_moving([driven(2.0, "odom", "mid")])
     assert told(frames) == []
-    frames.move([driven(1.5, "mid", "base")])
+    frames.add_moving([driven(1.5, "mid", "base")])
     assert told(frames) == [(1.5, 3.0)]
 
 
 def test_odometry_through_a_fixed_link(frames):
-    frames.fix([link("foot", "base", x=0.5)])
-    frames.move([driven(1.0, "odom", "foot")])
+    frames.add_static([link("foot", "base", x=0.5)])
+    frames.add_moving([driven(1.0, "odom", "foot")])
     assert told(frames) == [(1.0, 1.5)]
 
 
 def test_a_robot_that_is_fixed_to_its_odometry_is_asked_at_its_scans(frames):
-    frames.fix([link("odom", "base", x=3.0)])
+    frames.add_static([link("odom", "base", x=3.0)])
     assert frames.reach == math.inf
-    assert frames.news() == []
+    assert frames.new_odometry() == []
     assert frames.odometry_at(7.0) == [Odometry(7.0, SE2(3.0, 0.0, 0.0))]
-    assert frames.told_until == 7.0
+    assert frames.known_until == 7.0
 
 
 def test_a_message_that_was_overtaken_is_no_news_but_fills_a_gap(frames):
-    frames.move([driven(1.0)])
-    frames.move([link("odom", "base", 2.0, x=9.0)])
+    frames.add_moving([driven(1.0)])
+    frames.add_moving([link("odom", "base", 2.0, x=9.0)])
     assert told(frames) == [(2.0, 9.0)]
-    assert frames.move([driven(1.5)]) == 0.0
+    assert frames.add_moving([driven(1.5)]) == 0.0
     assert told(frames) == []
     assert frames.odometry_at(1.5)[0].T_odom_base.x == 1.5
 
@@ -99,7 +99,7 @@ def test_odometry_goes_forward_however_messages_overtake_each_other(delays):
     stamps = []
     sent = [0.1 * i for i in range(len(delays))]
     for i in sorted(range(len(delays)), key=lambda i: sent[i] + delays[i]):
-        assert frames.move([driven(sent[i])]) == 0.0
+        assert frames.add_moving([driven(sent[i])]) == 0.0
         stamps += [stamp for stamp, _ in told(frames)]
     assert stamps == sorted(set(stamps))
     assert stamps[-1] == sent[-1]
@@ -109,69 +109,71 @@ def test_odometry_goes_forward_however_messages_overtake_each_other(delays):
 
 
 def test_a_clock_set_back_is_told_and_what_moved_is_forgotten(frames):
-    frames.fix([link("base", "laser", x=0.2)])
-    frames.move([driven(100.0)])
-    frames.news()
-    assert frames.move([driven(40.0)]) == pytest.approx(60.0)
-    assert frames.told_until == -math.inf
+    frames.add_static([link("base", "laser", x=0.2)])
+    frames.add_moving([driven(100.0)])
+    frames.new_odometry()
+    assert frames.add_moving([driven(40.0)]) == pytest.approx(60.0)
+    assert frames.known_until == -math.inf
     assert told(frames) == [(40.0, 40.0)]
     assert frames.odometry_at(100.0) == []
     assert frames.laser_at("laser", 40.0).T_base_laser == SE2(0.2, 0.0, 0.0)
-    assert frames.move([driven(40.1)]) == 0.0
+    assert frames.add_moving([driven(40.1)]) == 0.0
     assert told(frames) == [(40.1, 40.1)]
 
 
 def test_a_second_is_no_clock_set_back(frames):
-    frames.move([driven(100.0)])
-    frames.news()
-    assert frames.move([driven(99.0)]) == 0.0
+    frames.add_moving([driven(100.0)])
+    frames.new_odometry()
+    assert frames.add_moving([driven(99.0)]) == 0.0
     assert frames.odometry_at(100.0) != []
 
 
 def test_a_clock_set_back_a_little_is_told_by_scans_and_odometry_together(frames):
-    frames.fix([link("base", "laser", x=0.2)])
+    frames.add_static([link("base", "laser", x=0.2)])
     for stamp in (100.0, 100.1, 100.2):
-        frames.move([driven(stamp)])
-        frames.news()
-        assert frames.set_back_at_scan(stamp) == 0.0
+        frames.add_moving([driven(stamp)])
+        frames.new_odometry()
+        assert frames.clock_step_at_scan(stamp) == 0.0
     # The clock was set back by 0.15 s, the robot drives on.
-    assert frames.move([link("odom", "base", 100.12, 100.27)]) == 0.0
+    assert frames.add_moving([link("odom", "base", 100.12, 100.27)]) == 0.0
     assert told(frames) == []
-    assert frames.set_back_at_scan(100.12) == pytest.approx(0.08)
-    assert (frames.told_until, frames.odometry_at(100.1)) == (-math.inf, [])
-    frames.move([link("odom", "base", 100.14, 100.29)])
+    assert frames.clock_step_at_scan(100.12) == pytest.approx(0.08)
+    assert (frames.known_until, frames.odometry_at(100.1)) == (-math.inf, [])
+    frames.add_moving([link("odom", "base", 100.14, 100.29)])
     assert told(frames) == [(100.14, 100.29)]
     assert frames.laser_at("laser", 100.14).T_base_laser == SE2(0.2, 0.0, 0.0)
-    assert frames.set_back_at_scan(100.14) == 0.0
+    assert frames.clock_step_at_scan(100.14) == 0.0
     assert frames.odometry_at(100.2) == []
 
 
 @pytest.mark.parametrize("older", [100.1, 100.16, 100.3])
 def test_one_of_two_lasers_that_is_late_does_not_set_the_clock_back(frames, older):
     for i in range(5):
-        frames.move([driven(100.2 + 0.1 * i)])
-        frames.news()
-        assert frames.set_back_at_scan(100.2 + 0.1 * i) == 0.0
-        assert frames.set_back_at_scan(older - 0.1 + 0.1 * i) == 0.0
+        frames.add_moving([driven(100.2 + 0.1 * i)])
+        frames.new_odometry()
+        assert frames.clock_step_at_scan(100.2 + 0.1 * i) == 0.0
+        assert frames.clock_step_at_scan(older - 0.1 + 0.1 * i) == 0.0
     assert frames.odometry_at(100.3) != []
 
 
 def test_odometry_that_was_overtaken_does_not_set_the_clock_back(frames):
-    frames.move([driven(100.0)])
-    frames.move([driven(100.4)])
-    frames.news()
-    frames.set_back_at_scan(100.3)
-    frames.move([driven(100.2)])
-    assert frames.set_back_at_scan(100.4) == 0.0
+    frames.add_moving([driven(100.0)])
+    frames.add_moving([driven(100.4)])
+    frames.new_odometry()
+    frames.clock_step_at_scan(100.3)
+    frames.add_moving([driven(100.2)])
+    assert frames.clock_step_at_scan(100.4) == 0.0
     assert frames.odometry_at(100.1) != []
 
 
 def test_only_odometry_tells_the_time(frames):
     """AMCL dates its transforms ahead, and another robot's clock is no concern of this one."""
-    frames.move([driven(100.0), driven(105.0, "map", "odom"), driven(100.0, "base", "camera")])
-    frames.news()
+    frames.add_moving(
+        [driven(100.0), driven(105.0, "map", "odom"), driven(100.0, "base", "camera")]
+    )
+    frames.new_odometry()
     others = [driven(100.1, "map", "odom"), driven(5.0, "base", "camera"), driven(5.0, "x", "y")]
-    assert frames.move(others) == 0.0
+    assert frames.add_moving(others) == 0.0
     assert frames.odometry_at(100.0) != []
 
 
@@ -179,22 +181,22 @@ def test_only_odometry_tells_the_time(frames):
 
 
 def test_the_topic_tells_where_tf_does_not(frames):
-    frames.move([driven(1.0, "map", "odom")])
-    assert frames.move_by_topic(driven(1.0)) == 0.0
+    frames.add_moving([driven(1.0, "map", "odom")])
+    assert frames.add_odometry(driven(1.0)) == 0.0
     assert told(frames) == [(1.0, 1.0)]
-    frames.move_by_topic(driven(2.0))
+    frames.add_odometry(driven(2.0))
     assert frames.odometry_at(1.5) == [Odometry(1.5, SE2(1.5, 0.0, 0.0))]
 
 
 def test_tf_takes_over_and_is_not_mixed_with_the_topic(frames):
-    frames.move_by_topic(link("odom", "base", 1.0, x=7.0))
+    frames.add_odometry(link("odom", "base", 1.0, x=7.0))
     assert told(frames) == [(1.0, 7.0)]
-    frames.move([driven(1.5)])
+    frames.add_moving([driven(1.5)])
     assert told(frames) == [(1.5, 1.5)]
     assert frames.odometry_at(1.25) == []
-    assert frames.move_by_topic(link("odom", "base", 3.0, x=7.0)) == 0.0
+    assert frames.add_odometry(link("odom", "base", 3.0, x=7.0)) == 0.0
     assert (frames.reach, told(frames)) == (1.5, [])
-    frames.move([driven(2.0)])
+    frames.add_moving([driven(2.0)])
     assert told(frames) == [(2.0, 2.0)]
 
 
@@ -202,8 +204,8 @@ def test_where_tf_moves_the_base_below_another_frame_the_topic_goes_on(frames):
     """A filter publishes odom_combined -> base, and odom is only a topic."""
     stamps = []
     for i in range(1, 6):
-        frames.move([driven(float(i), "odom_combined", "base")])
-        frames.move_by_topic(driven(i + 0.5))
+        frames.add_moving([driven(float(i), "odom_combined", "base")])
+        frames.add_odometry(driven(i + 0.5))
         assert frames.reach == i + 0.5
         stamps += [stamp for stamp, _ in told(frames)]
     assert stamps == [1.5, 2.5, 3.5, 4.5, 5.5]
@@ -211,28 +213,28 @@ def test_where_tf_moves_the_base_below_another_frame_the_topic_goes_on(frames):
 
 
 def test_the_topic_may_move_another_frame_of_the_robot(frames):
-    frames.fix([link("base", "base_link", x=0.5)])
-    frames.move_by_topic(driven(1.0, child="base_link"))
+    frames.add_static([link("base", "base_link", x=0.5)])
+    frames.add_odometry(driven(1.0, child="base_link"))
     assert told(frames) == [(1.0, 0.5)]
 
 
 def test_a_topic_without_a_child_moves_the_base(frames):
-    frames.move_by_topic(driven(1.0, child=""))
+    frames.add_odometry(driven(1.0, child=""))
     assert told(frames) == [(1.0, 1.0)]
 
 
 def test_a_topic_of_another_frame_is_named(frames):
-    frames.move_by_topic(driven(1.0, "wheel_odom"))
-    assert isinstance(frames.reach, NotKnown)
+    frames.add_odometry(driven(1.0, "wheel_odom"))
+    assert isinstance(frames.reach, LookupFailure)
     assert "odom" in frames.reach.why
     assert "wheel_odom" in frames.reach.why
-    assert frames.news() == []
+    assert frames.new_odometry() == []
 
 
 def test_the_topic_tells_of_a_clock_set_back_too(frames):
-    frames.move_by_topic(driven(100.0))
-    frames.news()
-    assert frames.move_by_topic(driven(40.0)) == pytest.approx(60.0)
+    frames.add_odometry(driven(100.0))
+    frames.new_odometry()
+    assert frames.add_odometry(driven(40.0)) == pytest.approx(60.0)
     assert told(frames) == [(40.0, 40.0)]
 
 
@@ -240,19 +242,19 @@ def test_the_topic_tells_of_a_clock_set_back_too(frames):
 
 
 def test_a_sensor_on_a_moving_mast_is_asked_at_the_stamp_of_its_scan(frames):
-    frames.fix([link("mast", "laser", x=0.1)])
-    frames.move([driven(1.0, "base", "mast"), driven(2.0, "base", "mast")])
+    frames.add_static([link("mast", "laser", x=0.1)])
+    frames.add_moving([driven(1.0, "base", "mast"), driven(2.0, "base", "mast")])
     assert frames.laser_at("laser", 1.5).T_base_laser.x == pytest.approx(1.6)
     later = frames.laser_at("laser", 2.5)
-    assert isinstance(later, NotKnown)
+    assert isinstance(later, LookupFailure)
     assert later.later
 
 
 def test_a_sensor_upside_down_and_a_tilted_one(frames):
-    frames.fix([link("base", "under", q=(1.0, 0.0, 0.0, 0.0))])
+    frames.add_static([link("base", "under", q=(1.0, 0.0, 0.0, 0.0))])
     assert frames.laser_at("under", 1.0).mounting is Mounting.UPSIDE_DOWN
     half = math.radians(45.0) / 2
-    frames.fix([link("base", "tilted", q=(0.0, math.sin(half), 0.0, math.cos(half)))])
+    frames.add_static([link("base", "tilted", q=(0.0, math.sin(half), 0.0, math.cos(half)))])
     with pytest.raises(ScanError, match="tilted by 45°"):
         frames.laser_at("tilted", 1.0)
 

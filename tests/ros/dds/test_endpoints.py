@@ -6,7 +6,7 @@ from cyclonedds.domain import Domain, DomainParticipant
 from dds_lab import LOOPBACK, free_domain, wait_for
 
 from firstfix.ros.channels import Delivery, Topic
-from firstfix.ros.dds.endpoints import Receiver, Sender, Watch
+from firstfix.ros.dds.endpoints import EventThread, Receiver, Sender
 from firstfix.ros.dds.types import decode, make
 
 RELIABLE = Topic("flag", "std_msgs/Bool", Delivery.RELIABLE)
@@ -88,17 +88,17 @@ def test_sensors_are_heard_however_they_publish(dds, other, offered):
 def test_both_ends_say_in_which_policy_they_do_not_fit(dds, other, offered, asked, policy):
     sender = Sender(dds.participant, offered, "rt/flag")
     receiver = Receiver(other, asked, "rt/flag")
-    assert f"a publisher does not fit in {policy}: " in wait_for(receiver.look)
-    assert f"a subscriber does not fit in {policy}: " in wait_for(sender.look)
-    assert receiver.look() is None  # once is enough
-    assert sender.look() is None
+    assert f"a publisher does not fit in {policy}: " in wait_for(receiver.check_matches)
+    assert f"a subscriber does not fit in {policy}: " in wait_for(sender.check_matches)
+    assert receiver.check_matches() is None  # once is enough
+    assert sender.check_matches() is None
 
 
 def test_an_end_that_fits_has_nothing_to_say(dds, other):
     sender = Sender(dds.participant, RELIABLE, "rt/flag")
     receiver = Receiver(other, RELIABLE, "rt/flag")
     wait_for(matched(sender))
-    assert (sender.look(), receiver.look()) == (None, None)
+    assert (sender.check_matches(), receiver.check_matches()) == (None, None)
 
 
 def test_listeners_count_when_they_have_had_time_to_find_the_sender(dds, other, monkeypatch):
@@ -106,12 +106,12 @@ def test_listeners_count_when_they_have_had_time_to_find_the_sender(dds, other, 
     receiver = Receiver(other, RELIABLE, "rt/flag")
     wait_for(matched(sender))
     monkeypatch.setattr("firstfix.ros.dds.endpoints._SETTLING_S", 1e9)
-    sender.look()
-    assert sender.listeners == 0
+    sender.check_matches()
+    assert sender.subscriber_count == 0
     monkeypatch.setattr("firstfix.ros.dds.endpoints._SETTLING_S", 0.0)
-    assert sender.listeners == 1
+    assert sender.subscriber_count == 1
     receiver.entity._delete(receiver.entity._ref)
-    wait_for(lambda: sender.look() or sender.listeners == 0)
+    wait_for(lambda: sender.check_matches() or sender.subscriber_count == 0)
 
 
 def test_domains_do_not_hear_each_other(dds):
@@ -135,7 +135,7 @@ def test_a_watch_looks_at_news_and_survives_a_fault(dds, other):
         if len(heard) == 1:
             raise OSError("no such luck")
 
-    watch = Watch(other, [receiver.news], look, lambda *what: complaints.append(what))
+    watch = EventThread(other, [receiver.news], look, lambda *what: complaints.append(what))
     wait_for(matched(sender))
     sender.send(YES)
     ((subject, text),) = wait_for(lambda: complaints)

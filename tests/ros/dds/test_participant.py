@@ -196,7 +196,7 @@ def test_who_finds_whom_is_as_the_variables_of_ros_say(dds):
     graphs = dds.ear_named(GRAPH.name, GRAPH.type_name)
     hidden = dds.node("--name", "hidden", **alone)
     dds.node("--name", "near", **near)
-    wait_for(lambda: graphs.heard and "nothing heard" in hidden.log)
+    wait_for(lambda: graphs.heard and "no message on" in hidden.log)
     assert {m.node_entities_info_seq[0].node_name for m in graphs.heard} == {"near"}
 
 

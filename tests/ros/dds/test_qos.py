@@ -4,24 +4,31 @@ pytest.importorskip("cyclonedds")
 
 from cyclonedds.qos import Policy
 
-from firstfix.ros.channels import PARTICLES, Delivery, Heard, Topic, heard_topics, said_topics
+from firstfix.ros.channels import (
+    PARTICLES,
+    Channel,
+    Delivery,
+    Topic,
+    published_topics,
+    subscribed_topics,
+)
 from firstfix.ros.dds.qos import quality
 from firstfix.ros.dds.types import type_hash
 from firstfix.ros.node_config import Mode, NodeConfig
 
-HEARD = heard_topics(NodeConfig())
+HEARD = subscribed_topics(NodeConfig())
 
 
 @pytest.mark.parametrize(
     ("heard", "reliable", "latched", "depth"),
     [
-        (Heard.SCAN, False, False, 5),
-        (Heard.ODOM, False, False, 5),
-        (Heard.MAP, True, True, 1),
-        (Heard.TF, True, False, 100),
-        (Heard.TF_STATIC, True, True, 100),
-        (Heard.INITIAL_POSE, True, False, 10),
-        (Heard.WHEEL_DROP, True, False, 10),
+        (Channel.SCAN, False, False, 5),
+        (Channel.ODOM, False, False, 5),
+        (Channel.MAP, True, True, 1),
+        (Channel.TF, True, False, 100),
+        (Channel.TF_STATIC, True, True, 100),
+        (Channel.INITIAL_POSE, True, False, 10),
+        (Channel.WHEEL_DROP, True, False, 10),
     ],
 )
 def test_topics_are_delivered_as_nav2_delivers_them(heard, reliable, latched, depth):
@@ -32,7 +39,7 @@ def test_topics_are_delivered_as_nav2_delivers_them(heard, reliable, latched, de
 
 
 def test_everything_travels_as_plain_cdr_and_is_not_heard_here():
-    topics = [*HEARD.values(), *said_topics(NodeConfig(mode=Mode.FULL), PARTICLES)]
+    topics = [*HEARD.values(), *published_topics(NodeConfig(mode=Mode.FULL), PARTICLES)]
     for topic in topics:
         policies = set(quality(topic))
         assert Policy.DataRepresentation(use_cdrv0_representation=True) in policies

@@ -26,7 +26,7 @@ from firstfix.io.ros_messages.outgoing import (
     pose_with_covariance,
     transforms,
 )
-from firstfix.ros.channels import PARTICLES, heard_topics, said_topics
+from firstfix.ros.channels import PARTICLES, published_topics, subscribed_topics
 from firstfix.ros.dds import types as dds_types
 from firstfix.ros.dds.graph import GRAPH
 from firstfix.ros.dds.types import Cdr, decode, described, encode, make, type_hash
@@ -69,9 +69,9 @@ def rosbags_own():
 
 
 def test_every_type_that_is_heard_or_said_is_among_those_tested_here():
-    topics = [*heard_topics(NodeConfig()).values()]
+    topics = [*subscribed_topics(NodeConfig()).values()]
     for mode in Mode:
-        topics += said_topics(NodeConfig(mode=mode), PARTICLES)
+        topics += published_topics(NodeConfig(mode=mode), PARTICLES)
     assert {topic.type_name for topic in topics} == MADE.keys()
 
 

@@ -58,7 +58,7 @@ def test_places_that_look_alike_are_told_instead_of_a_pose(ros1: Lab) -> None:
 
     robot.tell(hint=[truth.x + 0.2, truth.y - 0.2, truth.yaw + 0.2])
     said = watcher.wait_for("localization_status", state="LOCALIZED")
-    assert "a person said where" in said["message"]
+    assert "chosen by a person" in said["message"]
     handed_over = wait_until(
         lambda: watcher.lines("initialpose")[1:], lambda: "only what the person said"
     )[0]

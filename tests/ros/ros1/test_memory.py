@@ -37,4 +37,4 @@ def test_in_one_of_four_equal_rooms_a_node_that_is_restarted_knows_its_room(
     assert ros1.error_of(found).is_small
     # It has not moved since it was switched on.
     assert "the saved pose is as it was saved: saved " in second.said
-    assert "LOCALIZED: the saved pose said where; " in second.said
+    assert "LOCALIZED: chosen by the saved pose; " in second.said

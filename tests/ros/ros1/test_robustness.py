@@ -19,12 +19,12 @@ def test_what_is_missing_is_said_and_waited_for(ros1: Lab) -> None:
     flaws = ["no map", "no scan", "no stamp", "no odometry", "no laser frame", "map elsewhere"]
     robot = ros1.robot("stand", "--flaws", *flaws)
     for mended, warning in (
-        ("", "nothing heard on map (nav_msgs/OccupancyGrid)"),
-        ("", "nothing heard on scan (sensor_msgs/LaserScan)"),
+        ("", "no message on map (nav_msgs/OccupancyGrid)"),
+        ("", "no message on scan (sensor_msgs/LaserScan)"),
         ("no scan", "a scan has no stamp: its driver must write one"),
-        ("no stamp", "odometry (odom -> base_footprint) is not known: no transform tells of"),
-        ("no odometry", "the place of the laser is not known: no transform tells of laser;"),
-        ("no map", "the map is in 'second_floor', not in 'map': used as is"),
+        ("no stamp", "odometry (odom -> base_footprint) is unknown: no transform has the frame"),
+        ("no odometry", "the pose of the laser is unknown: no transform has the frame laser;"),
+        ("no map", "the map is in 'second_floor', not in 'map': used as it is"),
     ):
         flaws = [flaw for flaw in flaws if flaw != mended]
         robot.tell(flaws=flaws)
@@ -50,7 +50,9 @@ def assert_throttled(node: Program) -> None:
 def test_a_base_frame_that_no_transform_tells_of_is_named_with_those_there_are(ros1: Lab) -> None:
     node = ros1.node("_base_frame_id:=base_lynk")
     ros1.robot("stand")
-    node.wait_to_say("no transform tells of base_lynk; there are: base_footprint, laser, odom")
+    node.wait_to_say(
+        "no transform has the frame base_lynk; known frames: base_footprint, laser, odom"
+    )
     time.sleep(2.0)
     assert_throttled(node)
     node.send(signal.SIGINT)

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from firstfix.ros.channels import PARTICLE_POSES, heard_topics, said_topics
+from firstfix.ros.channels import PARTICLE_POSES, published_topics, subscribed_topics
 from firstfix.ros.node_config import Mode, NodeConfig
 
 rospy = pytest.importorskip("rospy")
@@ -19,8 +19,8 @@ TYPES = {
     topic.type_name
     for mode in Mode
     for topic in (
-        *heard_topics(NodeConfig(mode=mode)).values(),
-        *said_topics(NodeConfig(mode=mode), PARTICLE_POSES),
+        *subscribed_topics(NodeConfig(mode=mode)).values(),
+        *published_topics(NodeConfig(mode=mode), PARTICLE_POSES),
     )
     if not topic.type_name.startswith("kobuki/")
 }

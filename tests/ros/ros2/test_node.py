@@ -117,14 +117,14 @@ def test_what_is_latched_is_heard_before_it_is_active(lab: Lab, hall_plan: Occup
 
 
 def test_only_an_active_node_misses_scans(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("firstfix.ros.node._LOOK_S", 0.05)
+    monkeypatch.setattr("firstfix.ros.node._SILENCE_S", 0.05)
     node = lab.node()
     node.trigger_configure()
     (worker,) = [thread for thread in threading.enumerate() if thread.name == "firstfix"]
     worker.join(0.5)
     assert not lab.world.lines("warning")
     node.trigger_activate()
-    wait_until(lambda: any("nothing heard on scan" in w for w in lab.world.lines("warning")))
+    wait_until(lambda: any("no message on scan" in w for w in lab.world.lines("warning")))
 
 
 def test_all_is_given_back_and_it_can_be_configured_anew(

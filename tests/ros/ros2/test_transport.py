@@ -13,7 +13,7 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.io.ros_messages.incoming import to_planar, to_pose
 from firstfix.io.ros_messages.outgoing import pose_with_covariance
-from firstfix.ros.channels import PARTICLES, heard_topics, said_topics
+from firstfix.ros.channels import PARTICLES, published_topics, subscribed_topics
 from firstfix.ros.node_config import NodeConfig
 from firstfix.ros.transport import Severity
 
@@ -100,8 +100,8 @@ def test_services_that_come_too_early_have_no_effect(lab: Lab) -> None:
 def test_a_transport_logs_with_every_gravity(lab: Lab) -> None:
     transport = importlib.import_module("firstfix.ros.ros2.transport")
     made = transport.Ros2(lab.node(), NodeConfig())
-    for gravity in [*Severity, *Severity]:
-        made.log(gravity, gravity.value)
+    for severity in [*Severity, *Severity]:
+        made.log(severity, severity.value)
     assert [how for how, _ in lab.world.log] == ["info", "warning", "error"] * 2
 
 
@@ -109,21 +109,21 @@ def test_what_is_thought_too_late_is_dropped(lab: Lab) -> None:
     transport = importlib.import_module("firstfix.ros.ros2.transport")
     config = NodeConfig()
     made = transport.Ros2(lab.node(), config)
-    topic = said_topics(config, made.particles)[0]
+    topic = published_topics(config, made.particles)[0]
     message = lab.types.find("msg", topic.type_name)()
     made.close()
     made.publish(topic, message)
-    assert made.listeners(topic) == 0
+    assert made.subscriber_count(topic) == 0
     again = transport.Ros2(lab.nodes[0], config)
     lab.nodes[0].on_activate(None)
     lab.rclpy.try_shutdown()
     again.publish(topic, message)
-    assert again.listeners(topic) == 0
+    assert again.subscriber_count(topic) == 0
 
 
 def test_qualities_are_those_that_others_use(lab: Lab) -> None:
     config = NodeConfig()
-    topics = [*heard_topics(config).values(), *said_topics(config, PARTICLES)]
+    topics = [*subscribed_topics(config).values(), *published_topics(config, PARTICLES)]
     found = {}
     for topic in topics:
         quality = lab.types.quality(topic)

@@ -1,18 +1,16 @@
-"""Settings of AMCL from a parameter file of Nav2."""
+"""Typed values from a ROS 2 parameter file such as Nav2's."""
 
 from __future__ import annotations
 
 import difflib
-import os
 import sys
-from dataclasses import fields
+from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from firstfix.amcl.config import AmclConfig, MotionModel
+from firstfix.amcl.config import MotionModel
 from firstfix.core.errors import InputError
-from firstfix.core.se2 import SE2
 from firstfix.io.atomic_files import show
 from firstfix.io.parameters.ros1_amcl import ros1_remedy
 from firstfix.io.parameters.ros_parameters import read_parameters
@@ -41,62 +39,48 @@ _OLD_MODELS = {
     "differential": MotionModel.DIFFERENTIAL,
     "omnidirectional": MotionModel.OMNIDIRECTIONAL,
 }
-# A robot on a floor does not need z, but Nav2 has it.
-_POSE = {f"initial_pose.{part}": 0.0 for part in ("x", "y", "z", "yaw")}
-DEFAULTS: dict[str, Any] = {
-    entry.name: entry.default for entry in fields(AmclConfig) if entry.name != "initial_pose"
-} | _POSE
-"""Of all parameters, by the flat names of ROS."""
 # Above, a float64 may differ from the integer in the file.
 _MAX_INTEGER = 2**53
 
 
-def load_amcl_config(path: str | os.PathLike[str]) -> AmclConfig:
-    """Read the settings of AMCL from a parameter file.
+def read_values(path: Path, node: str, defaults: Mapping[str, Any]) -> dict[str, Any]:
+    """Read the parameters of one node.
 
-    Accepted are ``amcl: ros__parameters:``, also under a namespace or beside other nodes, the
+    Accepted are ``node: ros__parameters:``, also under a namespace or beside other nodes, the
     wildcard ``/**``, and the parameters alone. Parameters in `IGNORED` have no effect.
 
     Parameters
     ----------
-    path : path-like
+    path : Path
         The YAML.
+    node : str
+        Name of the node.
+    defaults : mapping of str to object
+        Default of each parameter by its dotted name; a value must have the type of its default.
 
     Returns
     -------
-    AmclConfig
-        Nav2's defaults for all parameters that the file does not set.
+    dict of str to object
+        The values in the file, by dotted name.
 
     Raises
     ------
     InputError
-        If there is no section for AMCL or more than one, a name is unknown, or a value has the
-        wrong type or is out of range.
+        If there is no section for this node or more than one, a name is unknown, or a value has the
+        wrong type.
     """
-    path = Path(path)
-    values = {}
-    for name, value in read_parameters(path, "amcl", frozenset(DEFAULTS)).items():
-        if name.partition(".")[0] not in IGNORED:
-            values[name] = _checked(name, value, path)
-    try:
-        return amcl_config(values)
-    except InputError as error:
-        raise InputError(
-            expected=f"{error.expected} in {path}", received=error.received, remedy=error.remedy
-        ) from error
+    found = read_parameters(path, node, frozenset(defaults)).items()
+    return {
+        name: _checked(name, value, path, defaults)
+        for name, value in found
+        if name.partition(".")[0] not in IGNORED
+    }
 
 
-def amcl_config(values: dict[str, Any]) -> AmclConfig:
-    """Return settings from some of `DEFAULTS` by name; raises InputError if out of range."""
-    x, y, _, yaw = (values.get(name, default) for name, default in _POSE.items())
-    settings = {name: value for name, value in values.items() if name not in _POSE}
-    return AmclConfig(initial_pose=SE2(x, y, yaw), **settings)
-
-
-def _checked(name: str, value: Any, path: Path) -> Any:
-    if name not in DEFAULTS:
-        raise _unknown(name, value, path)
-    default = DEFAULTS[name]
+def _checked(name: str, value: Any, path: Path, defaults: Mapping[str, Any]) -> Any:
+    if name not in defaults:
+        raise _unknown(name, value, path, defaults)
+    default = defaults[name]
     converted = _converted(value, default)
     if converted is None:
         quotes = "" if isinstance(default, str) else ", without quotes"
@@ -140,8 +124,8 @@ def _written(default: Any) -> str:
     return f'"{default}"' if isinstance(default, str) else str(default).lower()
 
 
-def _unknown(name: str, value: Any, path: Path) -> InputError:
-    near = difflib.get_close_matches(name, [*DEFAULTS, *IGNORED], 1)
+def _unknown(name: str, value: Any, path: Path, defaults: Mapping[str, Any]) -> InputError:
+    near = difflib.get_close_matches(name, [*defaults, *IGNORED], 1)
     nearest = f"the nearest is {near[0]}" if near else "delete the line, or check the file"
     remedy = ros1_remedy(name, str(value)) or nearest
     if name == "initial_pose":

@@ -18,7 +18,7 @@ KEPT_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class NotKnown:
+class LookupFailure:
     """Why a transform is not known.
 
     Parameters
@@ -77,7 +77,7 @@ class TransformBuffer:
         """Take in a transform that holds for all times, from ``tf_static``."""
         self._add(transform, fixed=True)
 
-    def forget_moves(self) -> None:
+    def discard_moving(self) -> None:
         """Forget all but the fixed transforms: the clock was set back."""
         self._edges = {child: edge for child, edge in self._edges.items() if edge.fixed}
 
@@ -86,7 +86,7 @@ class TransformBuffer:
         """All frames, sorted."""
         return tuple(sorted({*self._edges, *(edge.parent for edge in self._edges.values())}))
 
-    def newest(self, target: str, source: str) -> float | NotKnown:
+    def newest(self, target: str, source: str) -> float | LookupFailure:
         """Find the last time at which a transform is known.
 
         Parameters
@@ -96,16 +96,16 @@ class TransformBuffer:
 
         Returns
         -------
-        float or NotKnown
+        float or LookupFailure
             s; infinite if all links are fixed.
         """
         links = self.links(target, source)
-        if isinstance(links, NotKnown):
+        if isinstance(links, LookupFailure):
             return links
         edges = [self._edges[frame] for frame in links]
         return min((e.moves[-1].stamp for e in edges if not e.fixed), default=math.inf)
 
-    def links(self, target: str, source: str) -> tuple[str, ...] | NotKnown:
+    def links(self, target: str, source: str) -> tuple[str, ...] | LookupFailure:
         """Find the links between two frames.
 
         Parameters
@@ -115,13 +115,13 @@ class TransformBuffer:
 
         Returns
         -------
-        tuple of str or NotKnown
+        tuple of str or LookupFailure
             The child of each.
         """
         ways = self._ways(target, source)
-        return ways if isinstance(ways, NotKnown) else (*ways[0], *ways[1])
+        return ways if isinstance(ways, LookupFailure) else (*ways[0], *ways[1])
 
-    def at(self, target: str, source: str, stamp: float) -> NDArray[np.float64] | NotKnown:
+    def at(self, target: str, source: str, stamp: float) -> NDArray[np.float64] | LookupFailure:
         """Chain transforms at a time, interpolated where they move.
 
         Parameters
@@ -133,18 +133,18 @@ class TransformBuffer:
 
         Returns
         -------
-        ndarray, shape (4, 4), or NotKnown
+        ndarray, shape (4, 4), or LookupFailure
             ``T_target_source`` in space.
         """
         ways = self._ways(target, source)
-        if isinstance(ways, NotKnown):
+        if isinstance(ways, LookupFailure):
             return ways
         T_top = []
         for way in ways:
             T_top_frame = np.eye(4)
             for frame in way:
                 link = self._link(frame, stamp)
-                if isinstance(link, NotKnown):
+                if isinstance(link, LookupFailure):
                     return link
                 T_top_frame = link @ T_top_frame
             T_top.append(T_top_frame)
@@ -160,7 +160,7 @@ class TransformBuffer:
             edge = self._edges[new.child] = _Edge(new.parent, fixed)
         edge.add(new)
 
-    def _ways(self, target: str, source: str) -> tuple[list[str], list[str]] | NotKnown:
+    def _ways(self, target: str, source: str) -> tuple[list[str], list[str]] | LookupFailure:
         """Return the frames from each of two up to, but without, the lowest that is above both."""
         up = {frame: self._above(frame) for frame in (target, source)}
         above_target = set(up[target])
@@ -169,10 +169,12 @@ class TransformBuffer:
             return up[target][: up[target].index(top)], up[source][: up[source].index(top)]
         lost = [frame for frame in up if len(up[frame]) == 1 and frame not in self.frames]
         if lost:
-            listed = ", ".join(self.frames) or "none at all"
-            return NotKnown(f"no transform tells of {' and '.join(lost)}; there are: {listed}")
+            listed = ", ".join(self.frames) or "none"
+            return LookupFailure(
+                f"no transform has the frame {' and '.join(lost)}; known frames: {listed}"
+            )
         below = [f"{frame} (below {frames[-1]})" for frame, frames in up.items()]
-        return NotKnown(f"no transforms join {' and '.join(below)}")
+        return LookupFailure(f"no transforms join {' and '.join(below)}")
 
     def _above(self, frame: str) -> list[str]:
         """Return a frame and those above it, up to the root, or around a loop once."""
@@ -181,7 +183,7 @@ class TransformBuffer:
             frames.append(edge.parent)
         return frames
 
-    def _link(self, frame: str, stamp: float) -> NDArray[np.float64] | NotKnown:
+    def _link(self, frame: str, stamp: float) -> NDArray[np.float64] | LookupFailure:
         edge = self._edges[frame]
         moves = edge.moves
         if edge.fixed:
@@ -190,11 +192,13 @@ class TransformBuffer:
         link = f"the transform from {edge.parent} to {frame}"
         if at == len(moves):
             late = stamp - moves[-1].stamp
-            return NotKnown(f"{link} is {late:.3f} s older than the scan", later=True)
+            return LookupFailure(f"{link} is {late:.3f} s older than the scan", later=True)
         if moves[at].stamp == stamp:
             return matrix(moves[at])
         if at == 0:
-            return NotKnown(f"{link} is known only from {moves[0].stamp - stamp:.3f} s later on")
+            return LookupFailure(
+                f"{link} is known only from {moves[0].stamp - stamp:.3f} s later on"
+            )
         return matrix(_between(moves[at - 1], moves[at], stamp))
 
 

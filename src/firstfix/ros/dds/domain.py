@@ -1,4 +1,4 @@
-"""Which network of ROS 2 to take part in, by the environment variables of ROS."""
+"""The DDS domain, from the environment variables of ROS."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class DomainSettings:
 
 
 def domain_settings(environment: Mapping[str, str] = os.environ) -> DomainSettings:
-    """Read the variables of ROS, and CYCLONEDDS_URI, which has the last word.
+    """Read the variables of ROS; CYCLONEDDS_URI overrides them.
 
     Parameters
     ----------
@@ -47,12 +47,12 @@ def domain_settings(environment: Mapping[str, str] = os.environ) -> DomainSettin
     Returns
     -------
     DomainSettings
-        What rmw_cyclonedds would make of them.
+        The same as rmw_cyclonedds would use.
 
     Raises
     ------
     InputError
-        If a variable has a value that it cannot have.
+        If a variable has an invalid value.
     """
     own = f"<CycloneDDS><Domain>{_NAMES_COUNT}{_discovery(environment)}</Domain></CycloneDDS>"
     configuration = ",".join(filter(None, (own, environment.get("CYCLONEDDS_URI", ""))))
@@ -77,11 +77,11 @@ def _number(text: str) -> int:
 
 
 def _discovery(environment: Mapping[str, str]) -> str:
-    """Say whom to look for."""
+    """Return the configuration of discovery."""
     is_local = environment.get("ROS_LOCALHOST_ONLY") == "1"
     default = "LOCALHOST" if is_local else "SUBNET"
     reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") or default
-    if is_local:  # ROS lets the older variable count where both are set
+    if is_local:  # in ROS the older variable wins if both are set
         reach = "LOCALHOST"
     if reach not in _RANGES:
         raise InputError(
@@ -90,7 +90,7 @@ def _discovery(environment: Mapping[str, str]) -> str:
             remedy="unset it to find the robots of the local network",
         )
     if reach == "OFF":
-        # With a tag of its own, a participant is found by nobody.
+        # No other participant has the same tag.
         alone = f"<ParticipantIndex>none</ParticipantIndex><Tag>firstfix_{os.getpid()}</Tag>"
         return f"{_NO_MULTICAST}<Discovery>{alone}</Discovery>"
     text = "" if is_local or reach == "SYSTEM_DEFAULT" else environment.get("ROS_STATIC_PEERS", "")

@@ -1,4 +1,4 @@
-"""The ends of a topic in DDS: a sender, a receiver; and a thread that waits for their news."""
+"""Writers and readers of topics in DDS, and a thread that waits for their events."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from firstfix.ros.channels import Topic
 from firstfix.ros.dds.qos import STATUS_OF_READERS, STATUS_OF_WRITERS, mismatch, quality
 from firstfix.ros.dds.types import Cdr, described, encode
 
-# A subscriber that was found may need so long to find the publisher, s.
+# A discovered subscriber may need this long to discover the publisher, s.
 _SETTLING_S = 0.5
 _MOST_AT_ONCE = 100
-# After a fault that may stay.
+# Pause after an error that may repeat.
 _PAUSE_S = 1.0
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 
@@ -43,7 +43,7 @@ class Sender:
     participant : DomainParticipant
         Of the node.
     topic : Topic
-        Its type and delivery count.
+        Its type and delivery are used.
     name : str
         Its name in DDS.
     """
@@ -57,8 +57,8 @@ class Sender:
         self.entity.set_status_mask(STATUS_OF_WRITERS)
 
     @property
-    def listeners(self) -> int:
-        """How many listen, and have had time to find this sender."""
+    def subscriber_count(self) -> int:
+        """Number of subscribers that have had time to discover this sender."""
         now = time.monotonic()
         return sum(now - since >= _SETTLING_S for since in [*self._since.values()])
 
@@ -66,8 +66,8 @@ class Sender:
         """Publish a message."""
         self.entity.write(Cdr(encode(self._type_name, message)))
 
-    def look(self) -> str | None:
-        """Note who listens now, and say who does not fit."""
+    def check_matches(self) -> str | None:
+        """Update the subscribers, and describe one whose quality of service does not match."""
         now, known = time.monotonic(), self._since
         self.entity.get_publication_matched_status()  # so that it can change again
         matched = self.entity.get_matched_subscriptions()
@@ -83,7 +83,7 @@ class Receiver:
     participant : DomainParticipant
         Of the node.
     topic : Topic
-        Its type and delivery count.
+        Its type and delivery are used.
     name : str
         Its name in DDS.
     """
@@ -97,30 +97,30 @@ class Receiver:
         self.news = ReadCondition(self.entity, _ANY)
 
     def take(self) -> list[bytes]:
-        """Return what has come since the last call, oldest first."""
+        """Return the messages since the last call, oldest first."""
         samples = self.entity.take(_MOST_AT_ONCE, self.news)
         return [sample.data for sample in samples if sample.sample_info.valid_data]
 
-    def look(self) -> str | None:
-        """Say who does not fit."""
+    def check_matches(self) -> str | None:
+        """Describe a publisher whose quality of service does not match."""
         return mismatch(self.entity)
 
 
-class Watch:
-    """A thread that looks whenever something has news, and sleeps otherwise.
+class EventThread:
+    """A thread that handles events of DDS entities, and sleeps otherwise.
 
-    Callbacks of DDS are not used: they would wait for Python's lock in the thread that receives,
-    and Python may hold that lock until this very thread has received an acknowledgement.
+    Listeners of DDS are not used: they would wait for Python's lock in the receive thread, and
+    Python may hold that lock until this very thread has received an acknowledgement.
 
     Parameters
     ----------
     participant : DomainParticipant
         Of the node.
     entities : iterable of Entity
-        What to wait for: conditions, or ends with a mask of statuses.
-    look : callable
-        Must take away the reason why it was called.
-    complain : callable
+        Conditions, or ends with a status mask.
+    handle : callable
+        Must clear the event.
+    warn : callable
         Takes the subject and one sentence for people, should looking fail.
     """
 
@@ -128,11 +128,11 @@ class Watch:
         self,
         participant: DomainParticipant,
         entities: Iterable[Entity],
-        look: Callable[[], None],
-        complain: Callable[[str, str], None],
+        handle: Callable[[], None],
+        warn: Callable[[str, str], None],
     ) -> None:
-        self._look = look
-        self._complain = complain
+        self._handle = handle
+        self._warn = warn
         self._bell = GuardCondition(participant)
         self._waitset = WaitSet(participant)
         for entity in (self._bell, *entities):
@@ -151,9 +151,9 @@ class Watch:
             if self._bell.read():
                 return
             try:
-                self._look()
-            except Exception:  # noqa: BLE001 - a node that went deaf silently would be worse
-                self._complain("dds", f"an error of firstfix itself:\n{traceback.format_exc()}")
+                self._handle()
+            except Exception:  # noqa: BLE001 - a thread that ends silently would be worse
+                self._warn("dds", f"an error of firstfix itself:\n{traceback.format_exc()}")
                 time.sleep(_PAUSE_S)
 
 

@@ -1,4 +1,4 @@
-"""What a node must publish about itself for `ros2 node list` and `ros2 node info` to show it."""
+"""The entry of a node in the ROS graph, for `ros2 node list` and `ros2 node info`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from firstfix.ros.dds.types import is_before_iron, make
 
 GRAPH = Topic("ros_discovery_info", "rmw_dds_common/ParticipantEntitiesInfo", Delivery.LATCHED)
 
-# By this ROS 2 knows a participant as one of its own.
+# ROS 2 recognizes its participants by this.
 USER_DATA = b"enclave=/;"
 
 
@@ -24,7 +24,7 @@ def entities(
     readers: Iterable[Entity],
     writers: Iterable[Entity],
 ) -> Any:
-    """Build a message that says what belongs to a node.
+    """Build the message that lists the endpoints of a node.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The node for ROS 2 where no ROS is installed: a participant of DDS."""
+"""The node for ROS 2 over plain DDS, with no ROS installed."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.qos import Policy, Qos
 
 from firstfix.core.errors import InputError
-from firstfix.ros.channels import PARTICLES, Heard, Topic, heard_topics, said_topics
+from firstfix.ros.channels import PARTICLES, Channel, Topic, published_topics, subscribed_topics
 from firstfix.ros.dds.domain import DomainSettings, domain_settings
-from firstfix.ros.dds.endpoints import Receiver, Sender, Watch
+from firstfix.ros.dds.endpoints import EventThread, Receiver, Sender
 from firstfix.ros.dds.graph import GRAPH, USER_DATA, entities
 from firstfix.ros.dds.types import decode, make
 from firstfix.ros.names import Names
@@ -30,21 +30,21 @@ _LEVELS = {Severity.INFO: "INFO", Severity.WARNING: "WARN", Severity.ERROR: "ERR
 class Dds:
     """A transport for `Node`: messages and topics of ROS 2 over plain DDS.
 
-    There are no services: those of ROS 2 do not cross from one implementation of DDS to another.
+    There are no services: those of ROS 2 do not work across implementations of DDS.
 
     Parameters
     ----------
     config : NodeConfig
-        What is published depends on the mode.
+        The topics depend on the mode.
     names : Names
-        The place of the node among the names of the robot.
+        Name, namespace and remappings of the node.
     domain : DomainSettings
-        Where the robot is.
+        The domain of the robot.
 
     Raises
     ------
     InputError
-        If there is no way to take part in the domain.
+        If the domain cannot be joined.
     """
 
     particles = PARTICLES
@@ -52,32 +52,32 @@ class Dds:
     def __init__(self, config: NodeConfig, names: Names, domain: DomainSettings) -> None:
         self._config = config
         self._names = names
-        self._watches: list[Watch] = []
-        self._receivers: dict[Heard, Receiver] = {}
+        self._threads: list[EventThread] = []
+        self._receivers: dict[Channel, Receiver] = {}
         try:
             self._domain = Domain(domain.number, domain.configuration)
             self._participant = DomainParticipant(domain.number, Qos(Policy.Userdata(USER_DATA)))
         except DDSException as error:
             raise InputError(
-                expected=f"a way to take part in domain {domain.number}",
+                expected=f"to join domain {domain.number}",
                 received=f"{error}",
                 remedy="look at the lines of Cyclone DDS above, and at CYCLONEDDS_URI",
             ) from error
-        said = said_topics(config, PARTICLES)
-        self._senders = {t.name: Sender(self._participant, t, self._dds_name(t)) for t in said}
+        topics = published_topics(config, PARTICLES)
+        self._senders = {t.name: Sender(self._participant, t, self._dds_name(t)) for t in topics}
 
     def connect(self, node: Node) -> None:
-        """Subscribe all, and appear in the graph of ROS."""
+        """Subscribe, and publish the entry in the ROS graph."""
         self._node = node
         self._receivers = {
-            heard: Receiver(self._participant, topic, self._dds_name(topic))
-            for heard, topic in heard_topics(self._config).items()
+            channel: Receiver(self._participant, topic, self._dds_name(topic))
+            for channel, topic in subscribed_topics(self._config).items()
         }
         conditions = [receiver.news for receiver in self._receivers.values()]
         ends = [end.entity for end in self._ends]
-        self._watches = [
-            Watch(self._participant, conditions, self._hear, node.complain),
-            Watch(self._participant, ends, self._look, node.complain),
+        self._threads = [
+            EventThread(self._participant, conditions, self._receive, node.warn_throttled),
+            EventThread(self._participant, ends, self._check_matches, node.warn_throttled),
         ]
         readers = [receiver.entity for receiver in self._receivers.values()]
         writers = [sender.entity for sender in self._senders.values()]
@@ -86,9 +86,9 @@ class Dds:
         self._graph.send(entities(self._participant, *place, readers, writers))
 
     def close(self) -> None:
-        """Hear nothing more."""
-        for watch in self._watches:
-            watch.close()
+        """Stop receiving."""
+        for thread in self._threads:
+            thread.close()
 
     def make(self, type_name: str, /, **fields: Any) -> Any:
         """Build a message."""
@@ -98,14 +98,14 @@ class Dds:
         """Send a message."""
         self._senders[topic.name].send(message)
 
-    def listeners(self, topic: Topic) -> int:
-        """Count those who listen."""
-        return self._senders[topic.name].listeners
+    def subscriber_count(self, topic: Topic) -> int:
+        """Count the subscribers of a topic."""
+        return self._senders[topic.name].subscriber_count
 
-    def log(self, gravity: Severity, text: str) -> None:
+    def log(self, severity: Severity, text: str) -> None:
         """Write a line to the console, in the form of ROS 2."""
-        with contextlib.suppress(OSError):  # whoever read it may have gone
-            line = f"[{_LEVELS[gravity]}] [{time.time():.3f}] [{self._names.node}]: {text}\n"
+        with contextlib.suppress(OSError):  # the reader of the pipe may be gone
+            line = f"[{_LEVELS[severity]}] [{time.time():.3f}] [{self._names.node}]: {text}\n"
             sys.stderr.write(line)
             sys.stderr.flush()
 
@@ -116,39 +116,39 @@ class Dds:
     def _ends(self) -> list[Sender | Receiver]:
         return [*self._senders.values(), *self._receivers.values()]
 
-    def _hear(self) -> None:
-        for heard, receiver in self._receivers.items():
+    def _receive(self) -> None:
+        for channel, receiver in self._receivers.items():
             for data in receiver.take():
-                self._pass_on(heard, receiver, data)
+                self._pass_on(channel, receiver, data)
 
-    def _pass_on(self, heard: Heard, receiver: Receiver, data: bytes) -> None:
+    def _pass_on(self, channel: Channel, receiver: Receiver, data: bytes) -> None:
         try:
-            self._node.hear(heard, decode(receiver.type_name, data))
+            self._node.receive(channel, decode(receiver.type_name, data))
         except InputError as error:
-            self._node.complain(receiver.name, f"{receiver.name}: {error}")
+            self._node.warn_throttled(receiver.name, f"{receiver.name}: {error}")
 
-    def _look(self) -> None:
+    def _check_matches(self) -> None:
         for end in self._ends:
-            if (mismatch := end.look()) is not None:
-                self._node.complain(f"mismatch of {end.name}", f"{end.name}: {mismatch}")
+            if (mismatch := end.check_matches()) is not None:
+                self._node.warn_throttled(f"mismatch of {end.name}", f"{end.name}: {mismatch}")
 
 
 def run(config: NodeConfig, names: Names, make_node: MakeNode = Node) -> None:
-    """Run the node until it is interrupted or told to end.
+    """Run the node until SIGINT or SIGTERM.
 
     Parameters
     ----------
     config : NodeConfig
         Settings.
     names : Names
-        The place of the node among the names of the robot.
+        Name, namespace and remappings of the node.
     make_node : MakeNode
         Makes the node.
 
     Raises
     ------
     InputError
-        If the environment does not say which domain to take part in, or that is not possible.
+        If a variable of the environment is wrong, or the domain cannot be joined.
     """
     is_over = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

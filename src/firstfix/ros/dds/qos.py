@@ -1,4 +1,4 @@
-"""How topics are delivered by DDS, and what to say where two ends do not agree on that."""
+"""Quality of service of topics in DDS, and the report of a mismatch."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cyclonedds.util import duration
 from firstfix.ros.channels import Delivery, Topic
 from firstfix.ros.dds.types import type_hash
 
-# Transforms come in many messages, and none may be lost.
+# As in tf2: many nodes publish on this topic.
 _TF_DEPTH = 100
 _DEPTHS = {
     Delivery.SENSOR: 5,
@@ -22,11 +22,11 @@ _DEPTHS = {
 # Cyclone DDS holds Python's lock while a full writer waits for its readers.
 _LONGEST_WAIT = duration(milliseconds=100)
 
-# What ends of topics wake a thread for, besides messages.
+# Events besides messages.
 STATUS_OF_READERS = DDSStatus.RequestedIncompatibleQos
 STATUS_OF_WRITERS = DDSStatus.OfferedIncompatibleQos | DDSStatus.PublicationMatched
 
-# Ids of policies, from the DDS specification, that two ends of a topic of ROS can disagree on.
+# Ids from the DDS specification of the policies that can differ between ROS nodes.
 _POLICIES = {
     2: ("durability", "a latched topic needs a publisher that is transient local"),
     11: ("reliability", "a reliable subscriber needs a publisher that is reliable"),
@@ -40,12 +40,12 @@ def quality(topic: Topic) -> Qos:
     Parameters
     ----------
     topic : Topic
-        Its delivery and type count.
+        Its delivery and type are used.
 
     Returns
     -------
     Qos
-        As ROS 2 asks for it.
+        As in ROS 2.
     """
     depth = _TF_DEPTH if topic.type_name == "tf2_msgs/TFMessage" else _DEPTHS[topic.delivery]
     is_latched = topic.delivery in (Delivery.LATCHED, Delivery.LATCHED_MANY)
@@ -54,11 +54,11 @@ def quality(topic: Topic) -> Qos:
         Policy.Reliability.BestEffort if is_sensor else Policy.Reliability.Reliable(_LONGEST_WAIT),
         Policy.Durability.TransientLocal if is_latched else Policy.Durability.Volatile,
         Policy.History.KeepLast(depth),
-        # What a writer keeps for those who come late.
+        # What a writer keeps for late subscribers.
         Policy.DurabilityService(0, Policy.History.KeepLast(depth), -1, -1, -1),
         Policy.WriterDataLifecycle(autodispose=False),
         Policy.DataRepresentation(use_cdrv0_representation=True),
-        # What is published here must not be heard here.
+        # The node must not receive its own messages.
         Policy.IgnoreLocal.Participant,
         # ROS 2 since Iron warns of endpoints without the hash of their type.
         Policy.Userdata(f"typehash={type_hash(topic.type_name)};".encode()),
@@ -66,7 +66,7 @@ def quality(topic: Topic) -> Qos:
 
 
 def mismatch(end: DataReader | DataWriter) -> str | None:
-    """Say which policy has kept another end away since the last call.
+    """Name the policy that has kept another end from matching since the last call.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def mismatch(end: DataReader | DataWriter) -> str | None:
     Returns
     -------
     str or None
-        For people; None if all fits.
+        For people; None if all match.
     """
     if isinstance(end, DataReader):
         status, other = end.get_requested_incompatible_qos_status(), "publisher"

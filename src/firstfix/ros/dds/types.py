@@ -1,4 +1,4 @@
-"""Messages of ROS 2 without ROS: built, written as CDR and read by rosbags, described to DDS."""
+"""Messages of ROS 2 without ROS: rosbags reads and writes CDR, Cyclone DDS gets their types."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rosbags.typesys.store import Typestore
 
 from firstfix.core.errors import InputError
 
-# Of packages that are not part of ROS's own messages.
+# Messages of packages outside the ROS core.
 _DEFINITIONS = {
     "nav2_msgs/msg/Particle": "geometry_msgs/Pose pose\nfloat64 weight",
     "nav2_msgs/msg/ParticleCloud": "std_msgs/Header header\nnav2_msgs/Particle[] particles",
@@ -26,7 +26,7 @@ _DEFINITIONS = {
     "kobuki_ros_interfaces/msg/BumperEvent": "uint8 LEFT=0\nuint8 CENTER=1\nuint8 RIGHT=2\n"
     "uint8 RELEASED=0\nuint8 PRESSED=1\nuint8 bumper\nuint8 state",
 }
-# Packages that ROS 2 calls otherwise than `firstfix.ros.channels` does.
+# Packages that ROS 2 names differently than `firstfix.ros.channels`.
 _PACKAGES = {"kobuki": "kobuki_ros_interfaces"}
 # Until then a participant's id in `ros_discovery_info` had 24 bytes; since Iron it has 16.
 _BEFORE_IRON = ("foxy", "galactic", "humble")
@@ -34,7 +34,7 @@ _BASE = {"bool": bool, "byte": types.uint8, "char": types.uint8, "string": str}
 
 
 def is_before_iron() -> bool:
-    """Tell by ``ROS_DISTRO`` whether the others speak the dialect of an older ROS 2."""
+    """Return whether ``ROS_DISTRO`` names a distribution before Iron."""
     return os.environ.get("ROS_DISTRO", "") in _BEFORE_IRON
 
 
@@ -69,7 +69,7 @@ def make(type_name: str, /, **fields: Any) -> Any:
 
 
 def encode(type_name: str, message: Any) -> bytes:
-    """Write a message as CDR, with the four bytes that say so."""
+    """Write a message as CDR with its four-byte header."""
     return bytes(_store().serialize_cdr(message, full_name(type_name)))
 
 
@@ -81,7 +81,7 @@ def decode(type_name: str, data: bytes) -> Any:
     type_name : str
         ``package/Type``.
     data : bytes
-        CDR, with the four bytes that say so.
+        CDR with its four-byte header.
 
     Returns
     -------
@@ -155,22 +155,22 @@ class Cdr:
     Parameters
     ----------
     data : bytes
-        CDR, with the four bytes that say so.
+        CDR with its four-byte header.
     """
 
     def __init__(self, data: bytes) -> None:
         self.data = data
 
     def serialize(self, **_: Any) -> bytes:
-        """Give what is written."""
+        """Return the bytes to write."""
         return self.data
 
     @classmethod
     def deserialize(cls, data: bytes) -> Cdr:
-        """Take what was read."""
+        """Wrap the bytes that were read."""
         return cls(data)
 
     @classmethod
     def deserialize_key(cls, data: bytes) -> Cdr:
-        """Take a notice that a sender has gone; no message has a key."""
+        """Wrap the notice that a writer has disappeared; messages have no key."""
         return cls(data)

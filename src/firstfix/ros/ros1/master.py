@@ -1,4 +1,4 @@
-"""The master of ROS 1: notice that another one took over, and tell it everything again."""
+"""The master of ROS 1: detect a restart, and register again."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ import rospy
 
 _ASK_AGAIN_S = 0.3
 
-# What a master can do to its callers: be away, be about to begin, say no, or talk nonsense.
+# A master may be absent, starting, refuse a call, or answer nonsense.
 _ABSENT = (OSError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
 
 
 def wait_for_master() -> bool:
-    """Wait until there is a master: without one, rospy cannot take parameters of its arguments.
+    """Wait for the master: without one, rospy cannot set parameters from its arguments.
 
     Returns
     -------
     bool
-        False if a person got tired of it.
+        False after Ctrl-C.
     """
     try:
         if not rosgraph.is_master_online():
@@ -38,14 +38,14 @@ def wait_for_master() -> bool:
 
 
 def is_forgotten() -> bool:
-    """Tell whether there is a master that does not know this node, because it is a new one.
+    """Return whether the master does not know this node, because it was restarted.
 
-    Its process id would not tell: in a container, the next master often has the same one.
+    Its process id is no evidence: in a container, the next master often has the same one.
 
     Returns
     -------
     bool
-        False where no master answers.
+        False if no master answers.
     """
     try:
         _master().lookupNode(rospy.get_name())
@@ -57,20 +57,20 @@ def is_forgotten() -> bool:
 
 
 def register_anew(services: Sequence[rospy.Service]) -> bool:
-    """Tell the master all topics and services of this node.
+    """Register all topics and services of this node again.
 
-    Connections that outlived the old master are not cut: drivers that do not register anew
-    themselves go on talking to this node over them.
+    Connections that outlived the old master stay open: drivers that do not register again keep
+    using them.
 
     Parameters
     ----------
     services : sequence of rospy.Service
-        Those of this node; its topics, it knows itself.
+        Those of this node; rospy knows its topics.
 
     Returns
     -------
     bool
-        False if the master went away meanwhile.
+        False if the master disappeared meanwhile.
     """
     try:
         _register(_master(), services)
@@ -81,8 +81,8 @@ def register_anew(services: Sequence[rospy.Service]) -> bool:
 
 def _register(master: Any, services: Sequence[rospy.Service]) -> None:
     uri, name = rospy.get_node_uri(), rospy.get_name()
-    # Asked over the wire, as other tools do it: also of what rospy itself publishes and hears,
-    # such as rosout and clock, which no variable of ours holds.
+    # Queried over XML-RPC, as other tools do: so the topics of rospy itself, such as rosout and
+    # clock, are included.
     with xmlrpc.client.ServerProxy(uri) as proxy:
         own: Any = proxy
         for topic, kind in own.getPublications(name)[2]:

@@ -13,11 +13,11 @@ from rospy.numpy_msg import numpy_msg
 from firstfix.core.errors import InputError
 from firstfix.ros.channels import (
     PARTICLE_POSES,
+    Channel,
     Delivery,
-    Heard,
     Topic,
-    heard_topics,
-    said_topics,
+    published_topics,
+    subscribed_topics,
 )
 from firstfix.ros.node import MakeNode, Node
 from firstfix.ros.node_config import Mode, NodeConfig
@@ -29,7 +29,7 @@ from firstfix.ros.transport import Severity
 # Messages that wait for slow subscribers; after that the oldest are dropped.
 _QUEUE = 10
 _MASTER_CHECK_S = 1.0
-# A map server that could not be asked is asked again after, s.
+# The service static_map is called again after, s.
 _ASK_AGAIN_S = 2.0
 _LOG = {
     Severity.INFO: rospy.loginfo,
@@ -37,13 +37,13 @@ _LOG = {
     Severity.ERROR: rospy.logerr,
 }
 _SEARCHES = {
-    "global_localization": Heard.RESET,
-    "reinitialize_global_localization": Heard.RESET,
+    "global_localization": Channel.RESET,
+    "reinitialize_global_localization": Channel.RESET,
 }
-# A name has one provider: an AMCL that runs beside must not lose its own.
+# A service has one provider: an AMCL that runs beside must keep its own.
 _SERVICES = {
-    Mode.BOOTSTRAP: {**_SEARCHES, "~request_nomotion_update": Heard.UPDATE},
-    Mode.FULL: {**_SEARCHES, "request_nomotion_update": Heard.UPDATE},
+    Mode.BOOTSTRAP: {**_SEARCHES, "~request_nomotion_update": Channel.UPDATE},
+    Mode.FULL: {**_SEARCHES, "request_nomotion_update": Channel.UPDATE},
 }
 
 
@@ -59,7 +59,7 @@ class Ros1:
     particles = PARTICLE_POSES
 
     def __init__(self, config: NodeConfig) -> None:
-        topics = said_topics(config, PARTICLE_POSES)
+        topics = published_topics(config, PARTICLE_POSES)
         self._publishers = {topic.name: _publisher(topic) for topic in topics}
 
     def make(self, type_name: str, /, **fields: Any) -> Any:
@@ -67,7 +67,7 @@ class Ros1:
         return make(type_name, **fields)
 
     def publish(self, topic: Topic, message: Any) -> None:
-        """Send a message, unless the node is on its way out."""
+        """Send a message, unless the node is shutting down."""
         try:
             self._publishers[topic.name].publish(message)
         except rospy.ROSException:
@@ -75,13 +75,13 @@ class Ros1:
             if not rospy.core.is_shutdown_requested():
                 raise
 
-    def listeners(self, topic: Topic) -> int:
-        """Count those who listen."""
+    def subscriber_count(self, topic: Topic) -> int:
+        """Count the subscribers of a topic."""
         return int(self._publishers[topic.name].get_num_connections())
 
-    def log(self, gravity: Severity, text: str) -> None:
+    def log(self, severity: Severity, text: str) -> None:
         """Write to the console and to rosout."""
-        _LOG[gravity]("%s", text)
+        _LOG[severity]("%s", text)
 
 
 def run(arguments: list[str], make_node: MakeNode = Node) -> None:
@@ -106,13 +106,18 @@ def run(arguments: list[str], make_node: MakeNode = Node) -> None:
     config = configured(values)
     node = make_node(config, Ros1(config))
     node.start()
-    heard = heard_topics(config)
-    if not uses_topic and heard.pop(Heard.MAP, None) is not None:
+    topics = subscribed_topics(config)
+    if not uses_topic and topics.pop(Channel.MAP, None) is not None:
         threading.Thread(target=_ask_for_map, args=(node,), daemon=True).start()
-    for what, topic in heard.items():
-        _subscribe(topic, partial(node.hear, what))
+    for channel, topic in topics.items():
+        _subscribe(topic, partial(node.receive, channel))
     names = _SERVICES[config.mode]
-    _spin([rospy.Service(name, Empty, partial(_ask, node, what)) for name, what in names.items()])
+    _spin(
+        [
+            rospy.Service(name, Empty, partial(_ask, node, channel))
+            for name, channel in names.items()
+        ]
+    )
     node.stop()
 
 
@@ -132,13 +137,13 @@ def _begin(arguments: list[str]) -> Any:
 
 
 def _spin(services: list[rospy.Service]) -> None:
-    """Wait for the end; meanwhile, rospy does not notice when another master takes over."""
+    """Wait for the shutdown, and register with a restarted master, which rospy does not."""
     is_known = True
     while True:
         rospy.rostime.wallsleep(_MASTER_CHECK_S)
         is_new = is_forgotten()
         if rospy.is_shutdown():
-            return  # which is why the master does not know this node any more
+            return  # the master forgot this node because it unregistered
         if is_new:
             rospy.logwarn("the master was restarted: registering anew")
         if is_new or not is_known:
@@ -155,13 +160,13 @@ def _publisher(topic: Topic) -> rospy.Publisher:
     )
 
 
-def _subscribe(topic: Topic, hear: Any) -> None:
+def _subscribe(topic: Topic, receive: Any) -> None:
     if topic.type_name.startswith("kobuki/"):
-        rospy.Subscriber(topic.name, rospy.AnyMsg, lambda message: hear(decoded(message)))
+        rospy.Subscriber(topic.name, rospy.AnyMsg, lambda message: receive(decoded(message)))
         return
     # Long lists come as arrays: a tuple of the cells of a large map takes half a second.
     kind = numpy_msg(message_class(topic.type_name))
-    rospy.Subscriber(topic.name, kind, hear, tcp_nodelay=True)
+    rospy.Subscriber(topic.name, kind, receive, tcp_nodelay=True)
 
 
 def _switch(name: str, value: Any) -> bool:
@@ -172,17 +177,17 @@ def _switch(name: str, value: Any) -> bool:
     return value
 
 
-def _ask(node: Node, heard: Heard, _: Any) -> Any:
-    node.hear(heard)
+def _ask(node: Node, channel: Channel, _: Any) -> Any:
+    node.receive(channel)
     return Empty._response_class()  # noqa: SLF001 - rospy's name for it
 
 
 def _ask_for_map(node: Node) -> None:
-    """Fetch the map by the service, as AMCL does unless it is told to use the topic."""
+    """Fetch the map by the service, as AMCL does unless use_map_topic is set."""
     while not rospy.is_shutdown():
         grid = _map_of_service()
         if grid is not None:
-            node.hear(Heard.MAP, grid)
+            node.receive(Channel.MAP, grid)
             return
         rospy.rostime.wallsleep(_ASK_AGAIN_S)
 

@@ -1,4 +1,4 @@
-"""Message classes of ROS 1: those that are installed, and those that are not."""
+"""Message classes of ROS 1, installed or generated from their definitions."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _EMPTY_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
 
 @functools.cache
 def message_class(type_name: str) -> Any:
-    """Return the class of a message, made from its definition where its package is not installed.
+    """Return the class of a message, generated where its package is not installed.
 
     rospy needs few packages, and diagnostic_msgs is not among them.
 
     Parameters
     ----------
     type_name : str
-        ``package/Type``, one that ROS 1 Noetic has.
+        ``package/Type`` of ROS 1 Noetic.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def make(type_name: str, /, **fields: Any) -> Any:
 def decoded(message: rospy.AnyMsg) -> Any:
     """Decode a message by the definition that its publisher sent along.
 
-    So the packages of a Kobuki are not needed to hear it.
+    The packages of a Kobuki need not be installed.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class _Nothing(genpy.Message):  # type: ignore[misc]
 
 
 class Empty:
-    """``std_srvs/Empty``, a service that says nothing and answers nothing."""
+    """``std_srvs/Empty``."""
 
     _type = _EMPTY
     _md5sum = _EMPTY_MD5

@@ -21,12 +21,12 @@ AUTOSTART = "autostart"
 
 
 class Ros2Node(LifecycleNode):
-    """The node: parameters are read when it is configured; it hears and speaks while active.
+    """A lifecycle node: configure reads the parameters; topics are in use while it is active.
 
     Parameters
     ----------
     make_node : MakeNode
-        Makes what thinks.
+        Makes the localizing node.
     """
 
     def __init__(self, make_node: MakeNode = Node) -> None:
@@ -35,12 +35,12 @@ class Ros2Node(LifecycleNode):
         self._transport: Ros2 | None = None
         for parameter in parameters():
             self._declare(parameter)
-        text = "configure and activate at the start, where no lifecycle manager does it"
+        text = "configure and activate at the start, without a lifecycle manager"
         alone = ParameterDescriptor(description=text, dynamic_typing=True)
         self.declare_parameter(name=AUTOSTART, value=False, descriptor=alone)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Read the parameters, advertise and subscribe; begin to make kernels and map ready."""
+        """Read the parameters, advertise and subscribe; start to prepare kernels and map."""
         try:
             self._warn_of_unknown()
             names = [parameter.name for parameter in parameters()]
@@ -51,41 +51,41 @@ class Ros2Node(LifecycleNode):
             self.end()
             self.get_logger().error(" ".join(str(error).split()))
             return TransitionCallbackReturn.FAILURE
-        except Exception:  # noqa: BLE001 - rclpy would drop it without a word
+        except Exception:  # noqa: BLE001 - rclpy would drop it silently
             self.get_logger().error(f"an error of firstfix itself:\n{traceback.format_exc()}")
             return TransitionCallbackReturn.ERROR
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Speak and hear."""
+        """Publish and receive."""
         result = super().on_activate(state)
         if self._transport is not None:
             self._transport.activate()
         return result
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Be silent and deaf; what is known stays known."""
+        """Neither publish nor receive; keep the pose and the map."""
         if self._transport is not None:
             self._transport.deactivate()
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Forget all."""
+        """Discard everything."""
         self.end()
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Forget all, for good."""
+        """Discard everything."""
         self.end()
         return super().on_shutdown(state)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Forget all, so that it can be configured again."""
+        """Discard everything, so that it can be configured again."""
         self.end()
         return super().on_error(state)
 
     def end(self) -> None:
-        """Stop thinking, and give back topics and services."""
+        """Stop the worker, and destroy topics and services."""
         if self._transport is not None:
             self._transport.close()
         self._transport = None
@@ -94,12 +94,12 @@ class Ros2Node(LifecycleNode):
         try:
             self.declare_parameter(parameter.name, parameter.default, described(parameter))
         except InvalidParameterValueException:
-            # Out of range: kept for on_configure, which says so in one sentence.
+            # Out of range: kept for on_configure, which reports it in one sentence.
             anything = ParameterDescriptor(dynamic_typing=True)
             self.declare_parameter(parameter.name, parameter.default, anything)
 
     def _warn_of_unknown(self) -> None:
-        # rclpy passes over parameters that are not declared, thus over misspelt ones, in silence.
+        # rclpy ignores undeclared parameters silently, and misspelt ones are undeclared.
         for name, parameter in getattr(self, "_parameter_overrides", {}).items():
             if not self.has_parameter(name):
                 try:
@@ -116,9 +116,7 @@ def run(arguments: list[str], make_node: MakeNode = Node) -> None:
     arguments : list of str
         Of ROS: ``--ros-args -r topic:=other -p parameter:=value``.
     make_node : MakeNode
-        Makes what thinks.
-    make_node : MakeNode
-        Makes what thinks.
+        Makes the localizing node.
 
     Raises
     ------

@@ -13,10 +13,10 @@ from rclpy.lifecycle import LifecycleNode
 from firstfix.ros.channels import (
     PARTICLE_POSES,
     PARTICLES,
-    Heard,
+    Channel,
     Topic,
-    heard_topics,
-    said_topics,
+    published_topics,
+    subscribed_topics,
 )
 from firstfix.ros.node import Node
 from firstfix.ros.node_config import NodeConfig
@@ -24,21 +24,21 @@ from firstfix.ros.ros2.types import LATCHED, find, make, quality
 from firstfix.ros.transport import Severity
 
 _SERVICES = {
-    "reinitialize_global_localization": ("std_srvs/Empty", Heard.RESET),
-    "request_nomotion_update": ("std_srvs/Empty", Heard.UPDATE),
-    "set_initial_pose": ("nav2_msgs/SetInitialPose", Heard.INITIAL_POSE),
+    "reinitialize_global_localization": ("std_srvs/Empty", Channel.RESET),
+    "request_nomotion_update": ("std_srvs/Empty", Channel.UPDATE),
+    "set_initial_pose": ("nav2_msgs/SetInitialPose", Channel.INITIAL_POSE),
 }
 
 
 class Ros2:
-    """A transport for `Node`: what a lifecycle node has from being configured to cleaned up.
+    """A transport for `Node`: topics and services of a lifecycle node while it is configured.
 
     Parameters
     ----------
     owner : LifecycleNode
-        Whose topics and services these are.
+        The node.
     config : NodeConfig
-        What is published depends on the mode.
+        The topics depend on the mode.
     """
 
     def __init__(self, owner: LifecycleNode, config: NodeConfig) -> None:
@@ -47,7 +47,7 @@ class Ros2:
         self._node: Node | None = None
         self._is_active = False
         self.particles = PARTICLES if find("msg", PARTICLES.type_name) else PARTICLE_POSES
-        kinds = {t: find("msg", t.type_name) for t in said_topics(config, self.particles)}
+        kinds = {t: find("msg", t.type_name) for t in published_topics(config, self.particles)}
         self._publishers = {
             topic.name: owner.create_lifecycle_publisher(kind, topic.name, quality(topic))
             for topic, kind in kinds.items()
@@ -56,7 +56,7 @@ class Ros2:
         self._services: list[Any] = []
 
     def start(self, node: Node) -> None:
-        """Let a node think, subscribe to what it hears and offer what it can be asked.
+        """Start a node, subscribe to its topics and offer its services.
 
         Raises
         ------
@@ -66,30 +66,30 @@ class Ros2:
         node.start()
         self._node = node
         self.deactivate()
-        for heard, topic in heard_topics(self._config).items():
+        for channel, topic in subscribed_topics(self._config).items():
             if (kind := self._find("msg", topic.type_name, topic.name)) is not None:
-                hear = partial(self._hear, node, heard, topic)
-                made = self._owner.create_subscription(kind, topic.name, hear, quality(topic))
+                receive = partial(self._receive, node, channel, topic)
+                made = self._owner.create_subscription(kind, topic.name, receive, quality(topic))
                 self._subscriptions.append(made)
-        for name, (type_name, heard) in _SERVICES.items():
+        for name, (type_name, channel) in _SERVICES.items():
             if (kind := self._find("srv", type_name, name)) is not None:
-                answer = partial(self._answer, node, heard, name)
+                answer = partial(self._answer, node, channel, name)
                 self._services.append(self._owner.create_service(kind, name, answer))
 
     def activate(self) -> None:
-        """Pass on what is heard."""
+        """Pass messages on to the node."""
         self._is_active = True
         if self._node is not None:
-            self._node.misses_since = time.monotonic()
+            self._node.expects_topics_since = time.monotonic()
 
     def deactivate(self) -> None:
-        """Pass on only what is latched."""
+        """Pass on latched messages only."""
         self._is_active = False
         if self._node is not None:
-            self._node.misses_since = math.inf
+            self._node.expects_topics_since = math.inf
 
     def close(self) -> None:
-        """Let the node end, and give back all that was made."""
+        """Stop the node, and destroy its topics and services."""
         self._is_active = False
         if self._node is not None:
             self._node.stop()
@@ -108,24 +108,24 @@ class Ros2:
     def publish(self, topic: Topic, message: Any) -> None:
         """Send a message; while the node is not active, rclpy drops it."""
         if (publisher := self._publishers.get(topic.name)) is None:
-            return  # the node did not wait any longer for this thought
+            return  # closed while the worker was busy
         try:
             publisher.publish(message)
         except RuntimeError:
-            if rclpy.ok():  # if not, ROS has ended before the node
+            if rclpy.ok():  # if not, ROS was shut down before the node
                 raise
 
-    def listeners(self, topic: Topic) -> int:
-        """Count those who listen."""
+    def subscriber_count(self, topic: Topic) -> int:
+        """Count the subscribers of a topic."""
         publisher = self._publishers.get(topic.name)
         return publisher.get_subscription_count() if publisher is not None and rclpy.ok() else 0
 
-    def log(self, gravity: Severity, text: str) -> None:
+    def log(self, severity: Severity, text: str) -> None:
         """Write to the console and to rosout."""
         # rclpy refuses a second severity from the same place in the code.
-        if gravity is Severity.ERROR:
+        if severity is Severity.ERROR:
             self._owner.get_logger().error(text)
-        elif gravity is Severity.WARNING:
+        elif severity is Severity.WARNING:
             self._owner.get_logger().warning(text)
         else:
             self._owner.get_logger().info(text)
@@ -136,14 +136,14 @@ class Ros2:
             self.log(Severity.INFO, f"without {name}: this ROS 2 has no {type_name}")
         return found
 
-    def _hear(self, node: Node, heard: Heard, topic: Topic, message: Any) -> None:
-        # What is latched comes once: who ignored it before being active would never have it.
+    def _receive(self, node: Node, channel: Channel, topic: Topic, message: Any) -> None:
+        # A latched message comes once: if it were dropped while inactive, it would be lost.
         if self._is_active or topic.delivery in LATCHED:
-            node.hear(heard, message)
+            node.receive(channel, message)
 
-    def _answer(self, node: Node, heard: Heard, name: str, request: Any, response: Any) -> Any:
+    def _answer(self, node: Node, channel: Channel, name: str, request: Any, response: Any) -> Any:
         if self._is_active:
-            node.hear(heard, getattr(request, "pose", None))
+            node.receive(channel, getattr(request, "pose", None))
         else:
             self.log(Severity.WARNING, f"{name} has no effect: firstfix is not active")
         return response

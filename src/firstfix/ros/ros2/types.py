@@ -14,12 +14,12 @@ from firstfix.core.errors import InputError
 from firstfix.ros.channels import TF, Delivery, Topic
 from firstfix.ros.parameters import Parameter
 
-# Where a package has another name than its topics say.
+# Packages that ROS 2 names differently than `firstfix.ros.channels`.
 _PACKAGES = {"kobuki": "kobuki_ros_interfaces"}
-# What not every robot has installed; the node does without.
+# Optional packages.
 _OPTIONAL = ("kobuki", "nav2_msgs")
 
-# A queue of transforms is that long in tf2 too: many nodes send them, each its own.
+# As in tf2: many nodes publish on this topic.
 _TF_DEPTH = 100
 _DEPTHS = {
     Delivery.SENSOR: 5,
@@ -44,12 +44,12 @@ def find(kind: str, type_name: str) -> Any | None:
     Returns
     -------
     type or None
-        None for what the node can do without: its package is not installed, or too old to have it.
+        None if an optional package is not installed, or too old to have the type.
 
     Raises
     ------
     InputError
-        If a package is not installed that the node needs.
+        If a required package is not installed.
     """
     package, _, name = type_name.partition("/")
     module_name = f"{_PACKAGES.get(package, package)}.{kind}"
@@ -84,10 +84,10 @@ def quality(topic: Topic) -> QoSProfile:
 
 
 def described(parameter: Parameter) -> ParameterDescriptor:
-    """Return what tools show of a parameter, with a range where it has two ends.
+    """Return the descriptor of a parameter, with a range where it has two ends.
 
-    The type is dynamic, so that a whole number may stand for a length, too: what does not fit is
-    found out by `configured`, which says it in one sentence.
+    The type is dynamic, so that a whole number is accepted for a length; `configured` refuses other
+    types in one sentence.
     """
     descriptor = ParameterDescriptor(
         description=parameter.description,

@@ -11,7 +11,10 @@ from hypothesis import strategies as st
 from firstfix.amcl.config import AmclConfig, MotionModel, SensorModel
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
-from firstfix.io.parameters.amcl_yaml import IGNORED, load_amcl_config
+from firstfix.io.parameters.amcl_yaml import IGNORED
+from firstfix.localizer.config import LocalizerConfig
+from firstfix.ros.node_config import NodeConfig
+from firstfix.ros.parameters import defaults, load_node_config
 
 # As `ros2 param dump /amcl` writes it, values changed.
 DUMP = """
@@ -48,27 +51,34 @@ DUMP = """
 """
 
 
+def with_amcl(**values) -> NodeConfig:
+    return NodeConfig(localizer=LocalizerConfig(amcl=AmclConfig(**values)))
+
+
 @pytest.fixture
 def load(tmp_path):
-    def load(text: str | bytes) -> AmclConfig:
+    def load(text: str | bytes) -> NodeConfig:
         path = tmp_path / "nav2_params.yaml"
         path.write_bytes(text.encode() if isinstance(text, str) else text)
-        return load_amcl_config(path)
+        return load_node_config(path)
 
     return load
 
 
 def test_a_dump_of_the_node_is_read(load):
-    assert load(DUMP) == AmclConfig(
+    amcl = AmclConfig(
         alpha1=0.1,
         alpha2=0.01,
         alpha3=1.0,
-        base_frame_id="base_link",
         do_beamskip=True,
-        initial_pose=SE2(1.5, -2.0, 0.5),
         laser_model_type=SensorModel.LIKELIHOOD_FIELD_PROB,
         max_particles=3000,
         robot_model_type=MotionModel.OMNIDIRECTIONAL,
+    )
+    assert load(DUMP) == NodeConfig(
+        localizer=LocalizerConfig(amcl=amcl),
+        base_frame_id="base_link",
+        initial_pose=SE2(1.5, -2.0, 0.5),
         scan_topic="/robot1/scan",
         set_initial_pose=True,
         tf_broadcast=False,
@@ -76,12 +86,12 @@ def test_a_dump_of_the_node_is_read(load):
 
 
 def test_missing_parameters_have_their_defaults(load):
-    assert load("amcl: {ros__parameters: {use_sim_time: true}}") == AmclConfig()
+    assert load("amcl: {ros__parameters: {use_sim_time: true}}") == NodeConfig()
 
 
 def test_sections_of_other_nodes_are_ignored(load):
     other = "controller_server: {ros__parameters: {alpha1: many, FollowPath: {plugin: x}}}\n"
-    assert load(other + "amcl: {ros__parameters: {alpha1: 0.3}}").alpha1 == 0.3
+    assert load(other + "amcl: {ros__parameters: {alpha1: 0.3}}").localizer.amcl.alpha1 == 0.3
 
 
 @pytest.mark.parametrize(
@@ -92,7 +102,7 @@ def test_the_initial_pose_nested_or_dotted(load, text):
 
 
 def test_the_types_are_those_that_kernels_are_compiled_for(load):
-    config = load("alpha1: 1\nmax_beams: 30.0\ninitial_pose.x: 1")
+    config = load("alpha1: 1\nmax_beams: 30.0\ninitial_pose.x: 1").localizer.amcl
     for entry in fields(AmclConfig):
         assert type(getattr(config, entry.name)) is type(entry.default)
 
@@ -107,7 +117,7 @@ def test_the_types_are_those_that_kernels_are_compiled_for(load):
     ],
 )
 def test_motion_models_by_all_their_names(load, value, model):
-    assert load(f"robot_model_type: {value}").robot_model_type is model
+    assert load(f"robot_model_type: {value}").localizer.amcl.robot_model_type is model
 
 
 def written(value: object) -> object:
@@ -115,10 +125,9 @@ def written(value: object) -> object:
 
 
 def test_every_setting_can_be_written_and_read(load):
-    given_values = {
-        e.name: written(e.default) for e in fields(AmclConfig) if e.name != "initial_pose"
-    }
-    assert load(yaml.safe_dump({"amcl": {"ros__parameters": given_values}})) == AmclConfig()
+    known = {name: written(default) for name, default in defaults().items()}
+    given_values = {name: value for name, value in known.items() if value != ""}
+    assert load(yaml.safe_dump({"amcl": {"ros__parameters": given_values}})) == NodeConfig()
 
 
 @given(
@@ -137,14 +146,14 @@ def test_every_setting_can_be_written_and_read(load):
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_written_settings_are_read_unchanged(load, given_values):
     text = "".join(f"    {k}: {written(v)!r}\n" for k, v in given_values.items())
-    assert load(f"amcl:\n  ros__parameters:\n    use_sim_time: true\n{text}") == AmclConfig(
+    assert load(f"amcl:\n  ros__parameters:\n    use_sim_time: true\n{text}") == with_amcl(
         **given_values
     )
 
 
 @pytest.mark.parametrize("name", sorted(IGNORED))
 def test_ignored_parameters_may_have_any_value(load, name):
-    assert load(f"alpha1: 0.2\n{name}: [1, {{a: b}}]\n") == AmclConfig()
+    assert load(f"alpha1: 0.2\n{name}: [1, {{a: b}}]\n") == NodeConfig()
 
 
 @pytest.mark.parametrize(
