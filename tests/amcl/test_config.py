@@ -104,11 +104,6 @@ def test_a_whole_number_is_a_number():
             AmclConfig(update_min_d=enormous)
 
 
-def test_a_name_is_not_empty():
-    with pytest.raises(InputError, match="odom_frame_id"):
-        AmclConfig(odom_frame_id="")
-
-
 def test_an_error_names_the_range_and_the_default():
     with pytest.raises(InputError) as error:
         AmclConfig(z_hit=1.5)

@@ -106,7 +106,11 @@ def test_parameters_without_effect_in_a_node_are_refused_with_the_reason(name):
 
 
 def test_search_and_monitor_can_be_configured_on_a_robot():
-    values = {"locate.max_poses": 10**6, "locate.unique_probability": 0.9, "monitor.lost_after_s": 5.0}
+    values = {
+        "locate.max_poses": 10**6,
+        "locate.unique_probability": 0.9,
+        "monitor.lost_after_s": 5.0,
+    }
     localizer = configured(values).localizer
     assert localizer.locate == LocateConfig(max_poses=10**6, unique_probability=0.9)
     assert localizer.monitor == MonitorConfig(lost_after_s=5.0)
