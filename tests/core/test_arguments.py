@@ -79,6 +79,9 @@ def test_enums_and_poses_of_the_inputs_are_converted() -> None:
     assert Signal(0.0, "wheel_drop", True).kind is SignalKind.WHEEL_DROP
     assert ff.Odometry(0.0, (1, 2, 3)).T_odom_base == ff.SE2(1, 2, 3)
     assert PoseHint(0.0, [1, 2, 3]).T_map_base == ff.SE2(1, 2, 3)
+    lidar = ff.Lidar(T_base_laser=(0.1, 0.0, 0.0), mounting="upside_down")
+    assert lidar.T_base_laser == ff.SE2(0.1, 0.0, 0.0)
+    assert lidar.mounting is ff.Mounting.UPSIDE_DOWN
     config = AmclConfig(laser_model_type="beam", robot_model_type="stationary")
     assert config.laser_model_type is SensorModel.BEAM
     assert config.robot_model_type is MotionModel.STATIONARY

@@ -89,3 +89,18 @@ def test_a_map_that_would_fill_the_memory_is_refused(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(grid_module, "MAX_CELLS", 8)
     with pytest.raises(MapError, match="at most 8 cells, received 3 x 3"):
         OccupancyGrid(CELLS, 0.05)
+
+
+@pytest.mark.parametrize(
+    ("T_map_grid", "extent"),
+    [
+        ((0.0, 0.0, 0.0), (0.0, 2.0, 0.0, 1.0)),
+        ((-1.0, 3.0, 0.0), (-1.0, 1.0, 3.0, 4.0)),
+        ((0.0, 0.0, math.pi / 2), (-1.0, 0.0, 0.0, 2.0)),
+    ],
+)
+def test_the_extent_is_the_bounding_box_in_the_map_frame(
+    T_map_grid: tuple[float, float, float], extent: tuple[float, ...]
+) -> None:
+    grid = OccupancyGrid(np.zeros((10, 20), np.int8), 0.1, SE2(*T_map_grid))
+    assert grid.extent == pytest.approx(extent)

@@ -89,3 +89,45 @@ def test_a_pose_of_numbers_that_are_none_is_refused(bad: float, place: int) -> N
     numbers[place] = bad
     with pytest.raises(InputError, match="finite"):
         SE2(*numbers)
+
+
+def test_a_pose_unpacks_and_prints_in_one_line() -> None:
+    x, y, yaw = SE2(1.0, -2.0, math.pi)
+    assert (x, y, yaw) == (1.0, -2.0, math.pi)
+    assert str(SE2(5.898, 1.84, math.radians(-88.8))) == "(5.90, 1.84) m -88.8°"
+    assert str(SE2(-0.001, 0.0, -1e-6)) == "(0.00, 0.00) m 0.0°"
+
+
+@given(poses)
+def test_the_quaternion_leads_back_to_the_pose(pose: SE2) -> None:
+    assert math.hypot(*pose.quaternion) == pytest.approx(1.0)
+    back = SE2.from_quaternion(pose.x, pose.y, pose.quaternion)
+    assert (back.x, back.y) == (pose.x, pose.y)
+    assert angle_error(back.yaw, pose.yaw) < 1e-9
+    negated = [-part for part in pose.quaternion]
+    assert angle_error(SE2.from_quaternion(0.0, 0.0, negated).yaw, pose.yaw) < 1e-9
+
+
+@pytest.mark.parametrize("tilt_deg", [0.0, 10.0, 29.0, 31.0, 90.0, 180.0])
+def test_a_small_tilt_is_dropped_and_a_large_one_is_refused(tilt_deg: float) -> None:
+    """The quaternion is a tilt about x, then a turn of 0.7 rad about z."""
+    tilt, yaw = math.radians(tilt_deg) / 2, 0.7 / 2
+    quaternion = (
+        math.cos(yaw) * math.sin(tilt),
+        math.sin(yaw) * math.sin(tilt),
+        math.sin(yaw) * math.cos(tilt),
+        math.cos(yaw) * math.cos(tilt),
+    )
+    if tilt_deg > 30.0:
+        with pytest.raises(InputError, match="tilt of at most 30°"):
+            SE2.from_quaternion(0.0, 0.0, quaternion)
+    else:
+        assert SE2.from_quaternion(0.0, 0.0, quaternion).yaw == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(
+    "quaternion", [(0, 0, 0, 0), (0, 0, 1), (0, 0, 0, math.nan), (1, 1, 1, 1), ()]
+)
+def test_what_is_no_unit_quaternion_is_refused(quaternion: tuple[float, ...]) -> None:
+    with pytest.raises(InputError, match="length 1"):
+        SE2.from_quaternion(0.0, 0.0, quaternion)

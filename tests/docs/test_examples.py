@@ -90,7 +90,11 @@ def test_the_readme_prints_the_pose(folder: Path, capsys: pytest.CaptureFixture[
     first = PAGES["README.md"][0]
     assert len([line for line in first.code.splitlines() if line.strip()]) <= 10
     run([first])
-    assert "SE2(" in capsys.readouterr().out
+    assert re.fullmatch(
+        r"UNIQUE \(\d+\.\d\d, \d+\.\d\d\) m -?\d+\.\d° ±\d\.\d cm, p 1\.00\n",
+        capsys.readouterr().out,
+    )
+    assert (folder / "place.png").stat().st_size > 0
 
 
 def test_blocks_are_found_and_few_are_not_run() -> None:

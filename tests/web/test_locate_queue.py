@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 from live_lab import Site, drive, fed, until
 
 from firstfix.core.scan import LaserScan
-from firstfix.io.answers import answer_document
 from firstfix.lab.worlds.catalog import random_free_poses
 from firstfix.web.locate_queue import MOST_WAITING
 
@@ -63,7 +62,7 @@ def without_time(answer: dict) -> dict:
 
 
 def test_the_answer_is_that_of_the_library(api, site, scan):
-    expected = answer_document(0, site.store.snapshot.map.matcher.locate(scan), None)
+    expected = site.store.snapshot.map.matcher.locate(scan).to_dict()
     answer = api.post("/v1/locate", json=as_json(scan)).json()
     assert answer["verdict"] == "UNIQUE"
     assert set(answer) == set(expected)

@@ -44,7 +44,6 @@ def locate(
     _check_options(index, every, plot)
     from firstfix.cli.answers import as_text
     from firstfix.core.estimate import Verdict
-    from firstfix.io.answers import answer_document
     from firstfix.io.logs.load import load_recording
     from firstfix.io.maps.map_server import load_map
     from firstfix.lab.experiments.case import truth_at
@@ -68,7 +67,7 @@ def locate(
             truth = truth_at(recording, i)
             result = matcher.locate(recording.scans[i])
             if as_lines:
-                typer.echo(json.dumps(answer_document(i, result, truth), allow_nan=False))
+                typer.echo(json.dumps(result.to_dict(i, truth), allow_nan=False))
             else:
                 typer.echo(f"{f'scan {i}: ' if every else ''}{as_text(result, truth)}")
             done(result.verdict.value)

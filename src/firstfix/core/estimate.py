@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import base64
+import math
+from dataclasses import asdict, dataclass, field
 from enum import Enum
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from firstfix.core.errors import InputError
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.json_values import finite
+from firstfix.core.pose_error import PoseError
+from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Verdict(Enum):
@@ -73,6 +86,28 @@ class Hypothesis:
     evidence: Evidence
     id: int | None = None
 
+    @property
+    def sigma_m(self) -> float:
+        """Standard deviation of the position in its least certain direction, m."""
+        return math.sqrt(max(0.0, float(np.linalg.eigvalsh(self.covariance[:2, :2])[-1])))
+
+    def __str__(self) -> str:
+        spread = f" ±{100.0 * self.sigma_m:.1f} cm" if self.covariance.any() else ""
+        return f"{self.pose}{spread}, p {self.probability:.2f}"
+
+    def __repr__(self) -> str:
+        return f"<Hypothesis {self}>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the place as an object of docs/json.md: a member of ``hypotheses``."""
+        return {
+            "pose": list(self.pose),
+            "covariance": finite(self.covariance.tolist()),
+            "score": finite(self.score),
+            "probability": self.probability,
+            "evidence": asdict(self.evidence),
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class SearchReport:
@@ -95,7 +130,7 @@ class SearchReport:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LocateResult:
-    """The answer of the static stage to one scan.
+    """The result of `ScanMatcher.locate`. ``print(result)`` shows it in one line.
 
     Parameters
     ----------
@@ -109,6 +144,10 @@ class LocateResult:
         What was searched, and whether its optimum is proven.
     elapsed_s : float
         Wall time of the call, s.
+    grid : OccupancyGrid or None
+        The map that was searched, for pictures.
+    scan : LaserScan or None
+        The scan, for pictures.
     """
 
     verdict: Verdict
@@ -116,8 +155,103 @@ class LocateResult:
     hypotheses: tuple[Hypothesis, ...]
     search: SearchReport
     elapsed_s: float
+    grid: OccupancyGrid | None = field(default=None, repr=False)
+    scan: LaserScan | None = field(default=None, repr=False)
 
     @property
     def best(self) -> Hypothesis | None:
         """The most likely hypothesis; None if there is none."""
         return self.hypotheses[0] if self.hypotheses else None
+
+    def __str__(self) -> str:
+        if self.best is None or self.verdict is Verdict.NO_MATCH:
+            return f"{self.verdict.value}: {self.reason}"
+        return f"{self.verdict.value} {self.best}"
+
+    def __repr__(self) -> str:
+        return f"<LocateResult {self}>"
+
+    def to_dict(self, index: int = 0, truth: SE2 | None = None) -> dict[str, Any]:
+        """Return the result as the object that docs/json.md describes.
+
+        Parameters
+        ----------
+        index : int
+            Number of the scan in its recording.
+        truth : SE2 or None
+            ``T_map_base`` where it is known.
+
+        Returns
+        -------
+        dict
+            ``index``, ``verdict``, ``reason``, ``pose`` [x (m), y (m), yaw (rad)] and
+            ``covariance`` of the best hypothesis whatever the verdict (None if there is none),
+            ``hypotheses``, ``search``, ``elapsed_s``, ``error`` {"m", "deg"} (None without truth).
+            No NaN, no infinity.
+        """
+        places = [hypothesis.to_dict() for hypothesis in self.hypotheses]
+        error = None
+        if self.best is not None and truth is not None:
+            off = PoseError.between(self.best.pose, truth)
+            error = {"m": off.metres, "deg": math.degrees(off.radians)}
+        return {
+            "index": index,
+            "verdict": self.verdict.value,
+            "reason": self.reason,
+            "pose": places[0]["pose"] if places else None,
+            "covariance": places[0]["covariance"] if places else None,
+            "hypotheses": places,
+            "search": asdict(self.search),
+            "elapsed_s": self.elapsed_s,
+            "error": error,
+        }
+
+    def plot(self, path: str | Path | None = None, *, truth: SE2 | None = None) -> Figure:
+        """Draw the map, the scan at the best place, and all places.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            File to write: .png, .svg or .pdf. Missing folders are made.
+        truth : SE2, optional
+            ``T_map_base`` where it is known.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The picture.
+
+        Raises
+        ------
+        InputError
+            If matplotlib is not installed, the file cannot be written, or the result does not come
+            from `ScanMatcher.locate`.
+        """
+        from firstfix.plots import answer_picture, figure
+
+        if self.grid is None or self.scan is None:
+            raise InputError(
+                expected="a result with its map and scan",
+                received="a result without them",
+                remedy="plot a result of ScanMatcher.locate",
+            )
+        drawn = answer_picture.answer_figure(self.grid, self.scan, self, truth)
+        if path is not None:
+            figure.save_figure(drawn, Path(path))
+        return drawn
+
+    def _repr_png_(self) -> bytes | None:
+        """Return the picture for notebooks; None without matplotlib, map or scan."""
+        from firstfix.plots import figure
+
+        if self.grid is None or self.scan is None or not figure.can_draw():
+            return None
+        return figure.png_bytes(self.plot())
+
+    def _repr_html_(self) -> str | None:
+        """Return the line and the picture for notebooks; None without the picture."""
+        png = self._repr_png_()
+        if png is None:
+            return None
+        source = f"data:image/png;base64,{base64.b64encode(png).decode()}"
+        return f'<p>{escape(str(self))}</p><img alt="map, scan and places" src="{source}">'

@@ -126,6 +126,18 @@ class OccupancyGrid:
         return _read_only(unknown if self.unseen is None else unknown | self.unseen)
 
     @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Bounding box in the map frame: x_min, x_max, y_min, y_max, m; for ``imshow`` too."""
+        corners = [[0, 0], [self.width, 0], [0, self.height], [self.width, self.height]]
+        x, y = self.to_map(np.array(corners, np.float64)).T
+        return float(x.min()), float(x.max()), float(y.min()), float(y.max())
+
+    def __repr__(self) -> str:
+        sides = f"{self.width * self.resolution:.1f} x {self.height * self.resolution:.1f} m"
+        cells = f"{self.width} x {self.height} cells of {self.resolution:g} m"
+        return f"<OccupancyGrid {sides}, {cells}>"
+
+    @property
     def free_area(self) -> float:
         """Area of all cells where a robot can be, m²."""
         return float(np.count_nonzero(self.seen_free)) * self.resolution**2

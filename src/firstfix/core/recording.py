@@ -70,6 +70,13 @@ class Recording:
     def __len__(self) -> int:
         return len(self.scans)
 
+    def __repr__(self) -> str:
+        duration = self.scans[-1].stamp - self.scans[0].stamp
+        has = {"odometry": self.odometry, "ground truth": self.truth}
+        known = [name for name, value in has.items() if value is not None]
+        extras = f", with {' and '.join(known)}" if known else ""
+        return f"<Recording {len(self)} scans in {duration:.1f} s{extras}>"
+
     def messages(self) -> Iterator[Odometry | LaserScan]:
         """Return odometry and scans in the order of their stamps, as a robot sends them.
 

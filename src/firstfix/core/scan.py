@@ -108,6 +108,11 @@ class LaserScan:
     def __len__(self) -> int:
         return len(self.ranges)
 
+    def __repr__(self) -> str:
+        fov = math.degrees(abs(self.angle_increment) * len(self))
+        hits = np.count_nonzero(self.hit)
+        return f"<LaserScan {len(self)} beams over {fov:.0f}°, {hits} hits, stamp {self.stamp:.3f}>"
+
     @cached_property
     def bearings(self) -> NDArray[np.float64]:
         """Bearing of every beam seen from above in the upright sensor frame, shape (n,), rad."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from firstfix.core.angles import wrap
 from firstfix.core.errors import InputError
+
+# Beyond this tilt a rotation is not that of a robot on a floor.
+MAX_TILT = math.radians(30.0)
+# Quaternions in text files have few decimals; far from length 1 it is no quaternion.
+_NORM_ERROR = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +55,58 @@ class SE2:
         """Read a pose from its three numbers x (m), y (m), yaw (rad)."""
         x, y, yaw = np.asarray(pose, np.float64).tolist()
         return cls(x, y, yaw)
+
+    @classmethod
+    def from_quaternion(cls, x: float, y: float, quaternion: Sequence[float]) -> SE2:
+        """Read a pose whose heading is a quaternion, as in ``geometry_msgs/Pose``.
+
+        Parameters
+        ----------
+        x, y : float
+            Position, m.
+        quaternion : sequence of four floats
+            x, y, z, w; of length 1. A tilt of up to 30 degrees is dropped.
+
+        Raises
+        ------
+        InputError
+            If this is no unit quaternion, or it tilts more.
+
+        Examples
+        --------
+        >>> SE2.from_quaternion(1.0, 2.0, (0.0, 0.0, 0.0, 1.0))
+        SE2(x=1.0, y=2.0, yaw=0.0)
+        """
+        numbers = [float(part) for part in quaternion]
+        norm = math.hypot(*numbers)
+        if len(numbers) != 4 or not abs(norm - 1.0) <= _NORM_ERROR:
+            raise InputError(
+                expected="a quaternion x, y, z, w of length 1",
+                received=f"{numbers!r:.80}",
+                remedy="check the order of the numbers; no rotation is 0, 0, 0, 1",
+            )
+        qx, qy, qz, qw = (number / norm for number in numbers)
+        if 2.0 * math.asin(min(math.hypot(qx, qy), 1.0)) > MAX_TILT:
+            raise InputError(
+                expected=f"a tilt of at most {math.degrees(MAX_TILT):g}° from the z axis",
+                received=f"{numbers!r:.80}",
+                remedy="for an upside-down sensor use Mounting.UPSIDE_DOWN",
+            )
+        return cls(x, y, math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz)))
+
+    @property
+    def quaternion(self) -> tuple[float, float, float, float]:
+        """The heading as a unit quaternion x, y, z, w, as in ``geometry_msgs/Pose``."""
+        return 0.0, 0.0, math.sin(self.yaw / 2.0), math.cos(self.yaw / 2.0)
+
+    def __iter__(self) -> Iterator[float]:
+        """Unpack: ``x, y, yaw = pose``."""
+        return iter((self.x, self.y, self.yaw))
+
+    def __str__(self) -> str:
+        # Adding zero turns -0.0 into 0.0.
+        x, y = round(self.x, 2) + 0.0, round(self.y, 2) + 0.0
+        return f"({x:.2f}, {y:.2f}) m {round(math.degrees(self.yaw), 1) + 0.0:.1f}°"
 
     def as_array(self) -> NDArray[np.float64]:
         """Return x (m), y (m), yaw (rad) as an array of shape (3,)."""

@@ -61,6 +61,10 @@ class Trajectory:
     def __len__(self) -> int:
         return len(self.stamps)
 
+    def __repr__(self) -> str:
+        duration = float(self.stamps[-1] - self.stamps[0]) if len(self) else 0.0
+        return f"<Trajectory {len(self)} poses in {duration:.1f} s>"
+
     def at(self, stamp: float) -> SE2 | None:
         """Interpolate the pose at a time.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -94,8 +95,13 @@ class ScanMatcher:
         """
         as_instance(LaserScan, scan, "scan")
         if self._exhaustive is not None:
-            return self._exhaustive.locate(scan)
-        return locate(scan, self.fields, self.config)
+            result = self._exhaustive.locate(scan)
+        else:
+            result = locate(scan, self.fields, self.config)
+        return replace(result, grid=self.fields.grid, scan=scan)
+
+    def __repr__(self) -> str:
+        return f"<ScanMatcher {self.method.value} in {self.fields.grid!r}>"
 
     def score_poses(self, scan: LaserScan, poses: Sequence[SE2]) -> tuple[Hypothesis, ...]:
         """Tell how well a scan fits each of some poses: `firstfix.global_localization.scoring`.

@@ -106,6 +106,10 @@ class Localizer:
         """The state; only events in the table of `firstfix.localizer.states` change it."""
         return self._state
 
+    def __repr__(self) -> str:
+        grid = "" if self.matcher is None else f" in {self.matcher.fields.grid!r}"
+        return f"<Localizer {self.state.value}{grid}>"
+
     @property
     def particles(self) -> Particles | None:
         """The belief; None while there is none."""

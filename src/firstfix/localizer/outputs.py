@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ class InitialPose:
 
     stamp: float
     T_map_base: SE2
-    covariance: NDArray[np.float64]
+    covariance: NDArray[np.float64] = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -49,7 +49,7 @@ class TrackedPose:
 
     stamp: float
     T_map_base: SE2
-    covariance: NDArray[np.float64]
+    covariance: NDArray[np.float64] = field(repr=False)
     T_map_odom: SE2
 
 

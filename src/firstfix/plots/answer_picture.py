@@ -20,10 +20,11 @@ from firstfix.plots.map_image import draw_map
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 ROBOT_M = 0.2
-LEAST_VIEW_M = 4.0
-LEAST_LABELLED = 0.005  # what would read "0 %" hides what matters
+LEAST_VIEW_M = 2.0  # half a side
+LEAST_DRAWN = 0.005  # less likely places, "0 %", would hide the others
 
 BEAM_COLOURS = {
     BeamClass.EXPLAINED: GREEN,
@@ -40,20 +41,14 @@ def draw_answer(
     path: Path,
     truth: SE2 | None = None,
 ) -> Path:
-    """Draw an answer into a file.
+    """Draw a result into a file, as `answer_figure` does.
 
     Parameters
     ----------
-    grid : OccupancyGrid
-        The map.
-    scan : LaserScan
-        The scan.
-    result : LocateResult
-        The answer.
+    grid, scan, result, truth
+        As in `answer_figure`.
     path : Path
-        Where the picture goes; its suffix names the format: .png, .svg or .pdf.
-    truth : SE2 or None
-        ``T_map_base`` where it is known.
+        File to write; its suffix gives the format: .png, .svg or .pdf.
 
     Returns
     -------
@@ -65,6 +60,35 @@ def draw_answer(
     InputError
         If it cannot be written, or matplotlib is not installed.
     """
+    return save_figure(answer_figure(grid, scan, result, truth), path)
+
+
+def answer_figure(
+    grid: OccupancyGrid, scan: LaserScan, result: LocateResult, truth: SE2 | None = None
+) -> Figure:
+    """Draw a result: the whole map with all places, and the scan at the best place.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+    scan : LaserScan
+        The scan.
+    result : LocateResult
+        The answer.
+    truth : SE2 or None
+        ``T_map_base`` where it is known.
+
+    Returns
+    -------
+    Figure
+        Two axes, in the map frame, m.
+
+    Raises
+    ------
+    InputError
+        If matplotlib is not installed.
+    """
     figure = new_figure(14.0, 7.0)
     whole, near = figure.subplots(1, 2)
     draw_map(whole, grid)
@@ -75,15 +99,17 @@ def draw_answer(
         _zoom(near, scan, best.pose)
     for axes in (whole, near):
         for rank, hypothesis in reversed(list(enumerate(result.hypotheses, 1))):
-            _draw_hypothesis(axes, rank, hypothesis)
+            if rank == 1 or hypothesis.probability >= LEAST_DRAWN:
+                _draw_hypothesis(axes, rank, hypothesis)
         if truth is not None:
             axes.plot(truth.x, truth.y, "k+", ms=14, mew=2, label="truth", zorder=6)
     whole.set_title("places that fit" if best is not None else "no place fits")
     near.set_title("the beams that hit, at the best place" if best is not None else "the map")
-    if near.get_legend_handles_labels()[0]:
-        near.legend(loc="upper right", fontsize="small")
+    handles, labels = near.get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside lower right", ncols=3, fontsize="small")
     figure.suptitle(f"{result.verdict.value}: {result.reason}", wrap=True)
-    return save_figure(figure, path)
+    return figure
 
 
 def _draw_scan(axes: Axes, grid: OccupancyGrid, scan: LaserScan, T_map_base: SE2) -> None:
@@ -97,11 +123,11 @@ def _draw_scan(axes: Axes, grid: OccupancyGrid, scan: LaserScan, T_map_base: SE2
 
 
 def _draw_hypothesis(axes: Axes, rank: int, hypothesis: Hypothesis) -> None:
-    """Draw a robot with its heading, a ghost the less likely it is."""
+    """Draw a robot with its heading; the less likely, the fainter."""
     pose = hypothesis.pose
     colour, solid = (BLUE, 1.0) if rank == 1 else (PURPLE, 0.15 + 0.85 * hypothesis.probability)
     left, right = axes.get_xlim()
-    # On the whole of a large map a robot to scale would be a dot.
+    # In a large map a robot to scale would be a dot.
     size = max(ROBOT_M, (right - left) / 60)
     tip = pose.apply(np.array([3.0 * size, 0.0]))
     axes.annotate(
@@ -119,13 +145,13 @@ def _draw_hypothesis(axes: Axes, rank: int, hypothesis: Hypothesis) -> None:
         alpha=solid,
         zorder=5,
     )
-    if hypothesis.probability < LEAST_LABELLED:
-        return
     axes.annotate(
         f"{rank}: {100 * hypothesis.probability:.0f} %",
         xy=(pose.x, pose.y),
-        xytext=(8, 8),
-        textcoords="offset points",
+        # Above or below, where the arrow does not point.
+        xytext=(pose.x, pose.y - math.copysign(1.5 * size, pose.yaw)),
+        ha="center",
+        va="top" if pose.yaw >= 0.0 else "bottom",
         color=colour,
         fontsize="small",
         bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.7},
@@ -135,10 +161,11 @@ def _draw_hypothesis(axes: Axes, rank: int, hypothesis: Hypothesis) -> None:
 
 
 def _zoom(axes: Axes, scan: LaserScan, T_map_base: SE2) -> None:
-    points = T_map_base.apply(scan.points())
-    here = np.array([[T_map_base.x, T_map_base.y]])
-    # A few stray far returns must not shrink the room to a stamp.
-    far = np.percentile(np.abs(points - here), 98) if len(points) else 0.0
-    half = max(LEAST_VIEW_M, 1.1 * float(far))
-    axes.set_xlim(T_map_base.x - half, T_map_base.x + half)
-    axes.set_ylim(T_map_base.y - half, T_map_base.y + half)
+    """Show the scan and the robot, but not a few stray far returns."""
+    points = np.vstack([T_map_base.apply(scan.points()), [T_map_base.x, T_map_base.y]])
+    low, high = np.percentile(points, [1.0, 99.0], axis=0)
+    low, high = np.minimum(low, points[-1]), np.maximum(high, points[-1])
+    half = np.maximum(LEAST_VIEW_M, 0.55 * (high - low))
+    (left, bottom), (right, top) = (low + high) / 2 - half, (low + high) / 2 + half
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)

@@ -136,10 +136,7 @@ def save_figure(figure: Figure, path: Path) -> Path:
         If it cannot be written there.
     """
     check_path(path)
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        # Once more than when it is drawn: axes with a fixed aspect find their room only then.
-        engine.execute(figure)
+    _lay_out(figure)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.suffix.lower() == ".png":
@@ -153,6 +150,21 @@ def save_figure(figure: Figure, path: Path) -> Path:
             remedy="choose another file",
         ) from None
     return path.resolve()
+
+
+def png_bytes(figure: Figure) -> bytes:
+    """Return a figure as a PNG file."""
+    _lay_out(figure)
+    file = BytesIO()
+    _with_few_colours(figure).save(file, "png", optimize=True)
+    return file.getvalue()
+
+
+def _lay_out(figure: Figure) -> None:
+    """Lay out once more than when it is drawn: axes of fixed aspect find their size only then."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
 
 
 def _with_few_colours(figure: Figure) -> Image.Image:

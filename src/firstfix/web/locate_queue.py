@@ -13,7 +13,6 @@ from starlette.exceptions import HTTPException
 
 from firstfix.core.scan import MAX_BEAMS, LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.io.answers import answer_document
 from firstfix.io.logs.npz import read_scan
 from firstfix.web.commands import X, Y, Yaw
 from firstfix.web.json_decoding import decode
@@ -121,4 +120,4 @@ def _locate(body: bytes, kind: str, map_name: str | None, active_map: ActiveMap)
         scan = read_scan(io.BytesIO(body), _UNPACKED_BYTES)
     if map_name is not None and map_name != active_map.name:
         raise HTTPException(404, f"The only map here is {active_map.name!r:.60}.")
-    return answer_document(0, active_map.matcher.locate(scan), None)
+    return active_map.matcher.locate(scan).to_dict()

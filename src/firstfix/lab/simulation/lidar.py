@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.angles import FULL_TURN
+from firstfix.core.arguments import as_instance, as_member, as_pose
 from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import MAX_BEAMS, LaserScan, Mounting
@@ -64,6 +65,8 @@ class Lidar:
                     received=f"{value}",
                     remedy=f"choose another {name} for the simulated sensor",
                 )
+        object.__setattr__(self, "T_base_laser", as_pose(self.T_base_laser, "T_base_laser"))
+        object.__setattr__(self, "mounting", as_member(Mounting, self.mounting, "mounting"))
 
     @property
     def angle_increment(self) -> float:
@@ -93,7 +96,8 @@ class Lidar:
         LaserScan
             What the sensor says; inf where it got no return.
         """
-        T_map_laser = T_map_base @ self.T_base_laser
+        as_instance(OccupancyGrid, grid, "grid")
+        T_map_laser = as_pose(T_map_base, "T_map_base") @ self.T_base_laser
         true = expected_ranges(grid, T_map_laser, self.bearings, self.range_max)
         return self.measure(true, rng, stamp)
 

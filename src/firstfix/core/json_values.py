@@ -1,0 +1,21 @@
+"""Values that JSON can express."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+
+def finite(value: Any) -> Any:
+    """Replace NaN and infinity, at any depth of dicts and lists, by None.
+
+    Examples
+    --------
+    >>> finite({"pose": [1.0, float("nan")]})
+    {'pose': [1.0, None]}
+    """
+    if isinstance(value, dict):
+        return {key: finite(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [finite(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
