@@ -62,10 +62,10 @@ def prepared(grid: OccupancyGrid) -> tuple[object, ...]:
 
 
 def time_cache(grid: OccupancyGrid, runs: int) -> None:
-    arrays = {"field": np.resize(grid.cells, 15_000_000)}
+    array = np.resize(grid.cells, 15_000_000)
     show("content key of the map", runs, lambda: content_key(grid.cells))
     with tempfile.TemporaryDirectory() as folder:
-        show("load 15 MB", runs, lambda: load_or_build("key", lambda: arrays, Path(folder)))
+        show("load 15 MB", runs, lambda: load_or_build("key", lambda: array, Path(folder)))
 
 
 def show(what: str, runs: int, function: Callable[[], object]) -> None:

@@ -98,16 +98,15 @@ class MapFields:
         """Expected ranges at the positions, shape (n_positions, 2 * DIRECTIONS)."""
         # The only field that takes longer to build than to read from disk.
         if self.cache_dir is None:
-            return _read_only(self._build_ranges()["ranges"])
+            return _read_only(self._build_ranges())
         settings = repr(
             (self.grid.resolution, SPACING_M, MAX_POSITIONS, DIRECTIONS, UNIT_M, REACH_M)
         )
         key = cache.content_key("range table 1", self.grid.occupied, self.grid.seen_free, settings)
-        return _read_only(cache.load_or_build(key, self._build_ranges, self.cache_dir)["ranges"])
+        return _read_only(cache.load_or_build(key, self._build_ranges, self.cache_dir))
 
-    def _build_ranges(self) -> dict[str, NDArray[np.uint8]]:
-        table = build_range_table(self.clearance, self.grid.resolution, self.positions)
-        return {"ranges": table}
+    def _build_ranges(self) -> NDArray[np.uint8]:
+        return build_range_table(self.clearance, self.grid.resolution, self.positions)
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:
