@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from firstfix.global_localization.config import LocateConfig, Method
     from firstfix.global_localization.scan_matcher import ScanMatcher
     from firstfix.io.logs.load import load_recording
-    from firstfix.io.logs.npz_writer import save_recording
+    from firstfix.io.logs.npz import save_recording
     from firstfix.io.logs.tum import load_trajectory, save_trajectory
     from firstfix.io.maps.map_server import load_map, save_map
     from firstfix.lab.scenarios.example_drive import simulate_drive
@@ -102,7 +102,7 @@ _MODULES = {
     "global_localization.config": ("LocateConfig", "Method"),
     "global_localization.scan_matcher": ("ScanMatcher",),
     "io.logs.load": ("load_recording",),
-    "io.logs.npz_writer": ("save_recording",),
+    "io.logs.npz": ("save_recording",),
     "io.logs.tum": ("load_trajectory", "save_trajectory"),
     "io.maps.map_server": ("load_map", "save_map"),
     "lab.scenarios.example_drive": ("simulate_drive",),

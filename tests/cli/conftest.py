@@ -13,7 +13,7 @@ from firstfix.cli.app import run
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.recording import Recording
 from firstfix.core.se2 import SE2
-from firstfix.io.logs.npz_writer import save_recording
+from firstfix.io.logs.npz import save_recording
 from firstfix.io.maps.map_server import save_map
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import identical_rooms

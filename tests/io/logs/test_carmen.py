@@ -15,16 +15,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 from firstfix.core.errors import ScanError
 from firstfix.core.scan import Mounting
 from firstfix.core.se2 import SE2
-from firstfix.io.logs import log_lines
+from firstfix.io.logs import carmen_log
 from firstfix.io.logs.carmen import load_carmen
-from firstfix.io.logs.stamps import SORTED_AHEAD
+from firstfix.io.logs.checks import SORTED_AHEAD
 
 Write = Callable[..., Path]
 
 
 @pytest.fixture
 def write(tmp_path: Path) -> Write:
-    """Give a function that writes lines into a log."""
+    """Return a function that writes lines into a log."""
 
     def write(*lines: str, name: str = "a.log", end: str = "\n") -> Path:
         content = ("\n".join(lines) + end).encode()
@@ -182,7 +182,7 @@ def test_the_front_laser_is_preferred_wherever_it_turns_up(write: Write) -> None
     assert len(load_carmen(write(old_laser("9", kind="RLASER"), robot_laser())).scans[0]) == 5
 
 
-def test_an_unknown_kind_is_told(write: Write) -> None:
+def test_an_unknown_kind_is_reported(write: Write) -> None:
     with pytest.raises(ScanError, match="FLASER, ROBOTLASER1, RLASER"):
         load_carmen(write(old_laser()), kind="/scan")
 
@@ -209,7 +209,7 @@ def test_without_times_the_number_of_a_scan_counts(write: Write) -> None:
     assert "no times" in recording.notes[0]
 
 
-def test_the_logger_knows_the_time_where_the_sensor_does_not(write: Write) -> None:
+def test_the_stamp_of_the_logger_replaces_a_constant_one(write: Write) -> None:
     lines = [f"FLASER 1 1 0 0 0 0 0 0 0.0 host {t}" for t in (3.5, 4.5)]
     assert [scan.stamp for scan in load_carmen(write(*lines)).scans] == [3.5, 4.5]
 
@@ -242,7 +242,7 @@ def test_a_log_that_ends_without_a_line_end_is_whole(write: Write) -> None:
     assert len(load_carmen(write(*driven(2), end=""))) == 2
 
 
-def test_a_packed_log_that_was_cut_keeps_what_came_before(write: Write) -> None:
+def test_a_truncated_gzip_log_keeps_the_lines_before_the_cut(write: Write) -> None:
     rng = np.random.default_rng(1)
     path = write(*(old_laser(list(rng.uniform(1, 9, 180))) for _ in range(200)), name="a.log.gz")
     path.write_bytes(path.read_bytes()[:-5000])
@@ -251,29 +251,29 @@ def test_a_packed_log_that_was_cut_keeps_what_came_before(write: Write) -> None:
     assert "cut off" in " ".join(recording.notes)
 
 
-def test_poses_that_slam_wrote_are_told(write: Write) -> None:
+def test_poses_that_slam_wrote_are_reported(write: Write) -> None:
     assert "SLAM" in load_carmen(write(*driven(2), "NEFF 14.2")).notes[0]
 
 
 @pytest.mark.parametrize(
     "content", [b"", b"hello\nworld\n", b"\x00" * 5000, b"ODOM 1 2 3 4 5 6 7\n"]
 )
-def test_a_log_without_a_scan_says_what_was_seen(tmp_path: Path, content: bytes) -> None:
+def test_a_log_without_a_scan_is_rejected_with_counts(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "a.log"
     path.write_bytes(content)
     with pytest.raises(ScanError, match=r"none in the \d+ lines of .*a\.log"):
         load_carmen(path)
 
 
-def test_a_file_that_is_not_packed_is_told(tmp_path: Path) -> None:
+def test_a_file_that_is_not_packed_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "a.log.gz"
     path.write_text(old_laser())
     with pytest.raises(ScanError, match="a CARMEN log that can be read"):
         load_carmen(path)
 
 
-def test_only_what_is_asked_for_is_read(write: Write) -> None:
-    path = write(*driven(2 + SORTED_AHEAD), "x" * (log_lines.MAX_LINE_BYTES + 9))
+def test_max_scans_limits_the_lines_that_are_read(write: Write) -> None:
+    path = write(*driven(2 + SORTED_AHEAD), "x" * (carmen_log.MAX_LINE_BYTES + 9))
     recording = load_carmen(path, max_scans=2)
     assert len(recording) == 2
     assert recording.odometry is not None
@@ -293,15 +293,17 @@ def test_the_first_scans_are_the_first_by_stamp(write: Write) -> None:
         assert "sorted by stamp" in recording.notes[-1]
 
 
-def test_a_bomb_is_refused(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_lines, "MAX_LOG_BYTES", 10_000)
+def test_a_log_that_unpacks_to_too_much_fails(
+    write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(carmen_log, "MAX_LOG_BYTES", 10_000)
     path = write(*("# nothing" for _ in range(5_000)), name="a.log.gz")
     assert path.stat().st_size < 1000
     with pytest.raises(ScanError, match="at most 10000 bytes"):
         load_carmen(path)
 
 
-def test_a_scan_that_is_none_is_told_with_its_place(write: Write) -> None:
+def test_an_invalid_scan_is_reported_with_its_place(write: Write) -> None:
     log = write(old_laser(), robot_laser().replace(" 0.5 81.92", " 0 81.92"))
     with pytest.raises(ScanError, match=r"angle_increment 0.0 in scan 0 in .*a\.log"):
         load_carmen(log, kind="ROBOTLASER1")

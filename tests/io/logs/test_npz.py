@@ -28,7 +28,7 @@ Write = Callable[..., Path]
 
 @pytest.fixture
 def write(tmp_path: Path) -> Write:
-    """Give a function that writes a good file of three scans, but for what it is told."""
+    """Return a function that writes a file of three scans, with changes."""
 
     def write(**changes: Any) -> Path:
         arrays: dict[str, Any] = {
@@ -45,7 +45,7 @@ def write(tmp_path: Path) -> Write:
     return write
 
 
-def test_the_least_file_has_index_stamps_and_the_sensor_as_base(write: Write) -> None:
+def test_defaults_are_index_stamps_and_the_sensor_as_base(write: Write) -> None:
     recording = load_npz(write())
     assert [scan.stamp for scan in recording.scans] == [0.0, 1.0, 2.0]
     assert_array_equal(recording.scans[1].ranges, [4, 5, 6, 7])
@@ -63,7 +63,7 @@ def test_a_single_scan_may_be_a_plain_row(write: Write) -> None:
     assert len(load_npz(write(ranges=np.ones(5)))) == 1
 
 
-def test_everything_known_is_read(write: Write) -> None:
+def test_all_optional_arrays_are_read(write: Write) -> None:
     poses = np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.0 - 2.0 * np.pi], [np.nan] * 3])
     recording = load_npz(
         write(stamp=[5.0, 6.0, 6.5], true_pose=poses, odom=poses, run_id=[0, 0, 1])
@@ -72,13 +72,13 @@ def test_everything_known_is_read(write: Write) -> None:
     assert recording.odometry is not None
     assert recording.runs is not None
     assert_allclose(recording.truth, poses)
-    # A pose that is not known is no part of the path.
+    # Unknown poses are not part of the trajectory.
     assert_array_equal(recording.odometry.stamps, [5.0, 6.0])
     assert_allclose(recording.odometry.poses, poses[:2])
     assert_array_equal(recording.runs, [0, 0, 1])
 
 
-def test_odometry_that_is_never_known_is_none(write: Write) -> None:
+def test_odometry_of_nan_is_none(write: Write) -> None:
     assert load_npz(write(odom=np.full((3, 3), np.nan))).odometry is None
 
 
@@ -92,7 +92,7 @@ def test_poses_of_the_sensor_become_poses_of_the_base(write: Write) -> None:
     assert recording.scans[0].T_base_laser == T_base_laser
 
 
-def test_jitter_of_the_logger_is_sorted_out_with_everything_beside_it(write: Write) -> None:
+def test_jitter_of_stamps_is_sorted_in_all_arrays(write: Write) -> None:
     pose = np.array([[0.0, 0, 0], [2.0, 0, 0], [1.0, 0, 0]])
     recording = load_npz(write(stamp=[0.0, 2.0, 1.9], true_pose=pose, odom=pose, run_id=[0, 2, 1]))
     assert recording.truth is not None
@@ -105,7 +105,7 @@ def test_jitter_of_the_logger_is_sorted_out_with_everything_beside_it(write: Wri
     assert "sorted by stamp" in recording.notes[0]
 
 
-def test_only_the_first_scans_are_made_on_request(write: Write) -> None:
+def test_max_scans_limits_all_arrays(write: Write) -> None:
     recording = load_npz(write(true_pose=np.zeros((3, 3)), odom=np.zeros((3, 3))), max_scans=2)
     assert len(recording) == 2
     assert recording.truth is not None
@@ -115,7 +115,7 @@ def test_only_the_first_scans_are_made_on_request(write: Write) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "says"),
     [
         ({"ranges": None}, "the array `ranges`"),
         ({"range_max": None}, "the array `range_max`"),
@@ -139,12 +139,14 @@ def test_only_the_first_scans_are_made_on_request(write: Write) -> None:
         ({"T_base_laser": [0.0, np.nan, 0.0]}, "finite numbers"),
     ],
 )
-def test_what_does_not_fit_is_told(write: Write, changes: dict[str, Any], told: str) -> None:
-    with pytest.raises(ScanError, match=told):
+def test_inconsistent_arrays_are_rejected(
+    write: Write, changes: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ScanError, match=message):
         load_npz(write(**changes))
 
 
-def test_scans_that_say_nothing_are_legal(write: Write) -> None:
+def test_scans_without_any_return_are_valid(write: Write) -> None:
     nothing = np.array([[np.nan] * 4, [np.inf] * 4, [0.0, -1.0, -np.inf, 0.0]])
     recording = load_npz(write(ranges=nothing))
     assert not any(scan.hit.any() for scan in recording.scans)
@@ -152,7 +154,7 @@ def test_scans_that_say_nothing_are_legal(write: Write) -> None:
 
 
 def test_pickles_are_never_loaded(write: Write) -> None:
-    with pytest.raises(ScanError, match="numbers in the array `ranges`"):
+    with pytest.raises(ScanError, match="allow_pickle=False"):
         load_npz(write(ranges=np.array([{}, []], dtype=object)))
 
 
@@ -175,12 +177,12 @@ def _archive(path: Path, header: str, body: bytes) -> Path:
         "[" * 110,
     ],
 )
-def test_headers_that_lie_are_found_out_before_memory_is_taken(tmp_path: Path, header: str) -> None:
+def test_false_headers_are_rejected(tmp_path: Path, header: str) -> None:
     with pytest.raises(ScanError):
         load_npz(_archive(tmp_path / "lie.npz", header, b"\0" * 64))
 
 
-def test_a_bomb_is_refused_before_it_unpacks(tmp_path: Path) -> None:
+def test_an_archive_that_unpacks_to_too_much_is_rejected_first(tmp_path: Path) -> None:
     path = tmp_path / "bomb.npz"
     shape = (300_000, 1_000)  # 1.2 GB of zeros in about a megabyte
     stream = io.BytesIO()
@@ -201,7 +203,7 @@ def test_a_bomb_is_refused_before_it_unpacks(tmp_path: Path) -> None:
     assert time.process_time() - start < 1.0
 
 
-def test_what_is_no_archive_is_told(tmp_path: Path) -> None:
+def test_other_files_are_rejected(tmp_path: Path) -> None:
     path = tmp_path / "scans.npz"
     with pytest.raises(ScanError, match=r"an \.npz archive that can be read"):
         load_npz(path)
@@ -249,7 +251,7 @@ def _recording(mounting: Mounting = Mounting.UPRIGHT) -> Recording:
 
 
 @pytest.mark.parametrize("mounting", Mounting)
-def test_a_recording_comes_back_as_it_went(tmp_path: Path, mounting: Mounting) -> None:
+def test_a_saved_recording_is_loaded_unchanged(tmp_path: Path, mounting: Mounting) -> None:
     before = _recording(mounting)
     save_recording(before, tmp_path / "a.npz")
     after = load_npz(tmp_path / "a.npz")
@@ -269,7 +271,7 @@ def test_a_recording_comes_back_as_it_went(tmp_path: Path, mounting: Mounting) -
     assert_array_equal(before.runs, after.runs)
 
 
-def test_saving_replaces_the_file_whole_and_leaves_nothing_else(tmp_path: Path) -> None:
+def test_saving_replaces_the_file_and_leaves_no_draft(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     path.write_text("old")
     save_recording(Recording(_recording().scans), path)
@@ -277,7 +279,7 @@ def test_saving_replaces_the_file_whole_and_leaves_nothing_else(tmp_path: Path) 
     assert load_npz(path).truth is None
 
 
-def test_scans_of_two_sensors_do_not_fit_one_file(tmp_path: Path) -> None:
+def test_scans_of_two_sensors_are_rejected(tmp_path: Path) -> None:
     other = LaserScan(np.ones(3), 0.0, 0.1, 0.0, 9.0)
     with pytest.raises(ScanError, match="scans of one sensor"):
         save_recording(Recording((*_recording().scans, other)), tmp_path / "a.npz")
@@ -311,7 +313,7 @@ SENT = {
 }
 
 
-def test_a_scan_that_was_sent_is_read_with_its_place():
+def test_a_sent_scan_is_read_with_its_pose_on_the_robot():
     scan = read_scan(packed(T_base_laser=[0.1, 0.2, 0.3]), 10_000)
     assert scan.ranges.tolist() == [1.0, 2.0, math.inf]
     assert scan.T_base_laser == SE2(0.1, 0.2, 0.3)
@@ -327,6 +329,6 @@ def test_a_scan_that_was_sent_is_read_with_its_place():
         {"range_max": -1.0},
     ],
 )
-def test_what_is_not_one_scan_or_unpacks_to_too_much_is_refused(arrays):
-    with pytest.raises(ScanError, match=r"what was sent|one by one|split"):
+def test_several_scans_and_large_archives_are_rejected(arrays):
+    with pytest.raises(ScanError, match=r"the data sent|one by one|split"):
         read_scan(packed(**arrays), 10_000)

@@ -13,8 +13,14 @@ from firstfix.core.recording import Recording
 from firstfix.core.scan import LaserScan
 from firstfix.core.trajectory import Trajectory
 from firstfix.io.logs.bag_file import ODOMETRY, SCAN, TRANSFORMS, BagFile
-from firstfix.io.logs.scan_errors import MAX_SCANS, check_max_scans, located, too_many_scans
-from firstfix.io.logs.stamps import SORTED_AHEAD, ascending, sorting_notes
+from firstfix.io.logs.checks import (
+    SORTED_AHEAD,
+    ascending,
+    check_count,
+    check_max_scans,
+    located,
+    sorting_notes,
+)
 from firstfix.io.ros_messages.incoming import (
     to_frame,
     to_laser_scan,
@@ -78,8 +84,7 @@ def load_bag(
         topic = _scan_topic(bag, topic)
         messages = islice(bag.messages(SCAN, [topic]), n_most + SORTED_AHEAD)
         read = [_Sweep(*item) for item in messages]
-        if max_scans is None and len(read) > MAX_SCANS:
-            raise too_many_scans(path)
+        check_count(len(read), max_scans, path)
         if not read:
             raise _no_scan(topic)
         order = ascending(np.array([sweep.stamp for sweep in read]))

@@ -16,7 +16,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from firstfix.core.errors import ScanError
-from firstfix.io.logs.scan_errors import unreadable
+from firstfix.io.logs.checks import unreadable
 
 SCAN = "sensor_msgs/msg/LaserScan"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +13,20 @@ from firstfix.core.recording import Recording
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.core.trajectory import Trajectory
-from firstfix.io.logs.carmen_lines import PARSERS, ScanLine
-from firstfix.io.logs.carmen_log import CarmenLog, read_log
-from firstfix.io.logs.carmen_mounting import mounted_at
-from firstfix.io.logs.scan_errors import MAX_SCANS, check_max_scans, located, too_many_scans
-from firstfix.io.logs.stamps import SORTED_AHEAD, ascending, sorting_notes
+from firstfix.io.logs.carmen_log import KINDS, CarmenLog, ScanLine, read_log
+from firstfix.io.logs.checks import (
+    SORTED_AHEAD,
+    ascending,
+    check_count,
+    check_max_scans,
+    located,
+    sorting_notes,
+)
+from firstfix.io.ros_messages.poses import alike
 
-KINDS = tuple(PARSERS)
+# Poses in logs are rounded; a SLAM correction soon exceeds this.
+SAME_M = 0.01
+SAME_RAD = math.radians(0.5)
 
 
 def load_carmen(
@@ -26,8 +34,8 @@ def load_carmen(
 ) -> Recording:
     """Read the scans of one laser, and the odometry, from a CARMEN log.
 
-    Odometry is the robot pose of the scan lines, or, where that never changes, the ODOM lines.
-    A reading from 80 m up, or from PARAM ``robot_front_laser_max``, means nothing within range.
+    Odometry is the robot pose of the scan lines, or, if that never changes, the ODOM lines. A
+    reading from 80 m up, or from PARAM ``robot_front_laser_max``, means no return.
     Malformed lines are skipped and counted in the notes.
 
     Parameters
@@ -35,7 +43,7 @@ def load_carmen(
     path : str or Path
         The log; gzipped if its name ends in ``.gz``.
     kind : str or None
-        FLASER, ROBOTLASER1 or RLASER; None for the first of these that the log has.
+        FLASER, ROBOTLASER1 or RLASER; None for the first of these in the log.
     max_scans : int or None
         Only the first ones by stamp.
 
@@ -54,15 +62,14 @@ def load_carmen(
         raise ScanError(
             expected=f"a kind of scan line among {', '.join(KINDS)}",
             received=f"{kind!r} for {path}",
-            remedy="choose one of them, or none for the first that the log has",
+            remedy="choose one of them, or leave it out to read the first one in the log",
         )
     n_most = check_max_scans(max_scans)
-    # Some more than are wanted: scans may be late, and in a single line the place of a sensor and
-    # a SLAM correction look alike.
+    # More than requested: scans may be late, and in a single line the pose of a sensor and a SLAM
+    # correction cannot be distinguished.
     log = read_log(path, KINDS if kind is None else (kind,), n_most + SORTED_AHEAD)
-    if max_scans is None and len(log.scans) > MAX_SCANS:
-        raise too_many_scans(path)
-    T_base_laser, mounting_notes = mounted_at(log.kind, log.scans, log.params)
+    check_count(len(log.scans), max_scans, path)
+    T_base_laser, mounting_notes = _mounted_at(log)
     stamps, stamp_notes = _stamps(log.scans)
     order = ascending(stamps)
     first = order[:n_most]
@@ -72,6 +79,36 @@ def load_carmen(
             odometry=_odometry(log, stamps, first),
             notes=(*_log_notes(log), *mounting_notes, *stamp_notes, *sorting_notes(order)),
         )
+
+
+def _mounted_at(log: CarmenLog) -> tuple[SE2, tuple[str, ...]]:
+    """Return T_base_laser: offsets in PARAM lines, else laser pose minus robot pose; and notes.
+
+    The poses of a line determine it only if their difference is constant: after SLAM the laser
+    pose is a corrected one. A rear laser looks backwards.
+    """
+    side = "rear" if log.kind == "RLASER" else "front"
+    name = f"robot_{side}laser"
+    offsets = ("offset", "side_offset", "angular_offset")
+    x, y, yaw = (log.params.get(f"{name}_{offset}", 0.0) for offset in offsets)
+    default = SE2(x, y, yaw + (math.pi if side == "rear" else 0.0))
+    if any((x, y, yaw)):
+        return default, ()
+    seen = [scan.robot_pose.inverse() @ scan.laser_pose for scan in log.scans]
+    is_constant = all(_same(pose, seen[0]) for pose in seen)
+    if is_constant and not _same(seen[0], SE2.identity()):
+        return seen[0], ()
+    if is_constant or f"{name}_offset" in log.params:
+        return default, ()
+    note = (
+        "the log does not contain the pose of the laser on the robot (its laser poses are "
+        "corrected by SLAM): the poses found are those of the laser"
+    )
+    return default, (note,)
+
+
+def _same(a: SE2, b: SE2) -> bool:
+    return alike(a, b, distance=SAME_M, angle=SAME_RAD)
 
 
 def _scans(
@@ -99,10 +136,10 @@ def _scans(
 
 def _stamps(scans: list[ScanLine]) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     for column in np.array([scan.stamps for scan in scans]).T:
-        # Converters write one constant where the time is not known.
+        # Converters write one constant if the time is unknown.
         if np.isfinite(column).all() and (np.ptp(column) > 0.0 or len(column) == 1):
             return column, ()
-    note = "the log has no times: the number of a scan counts as its seconds"
+    note = "the log has no times: the index of a scan counts as its seconds"
     return np.arange(len(scans), dtype=np.float64), (note,)
 
 
@@ -124,7 +161,7 @@ def _log_notes(log: CarmenLog) -> tuple[str, ...]:
     if log.malformed:
         notes.append(f"{log.malformed} of {log.seen} lines are malformed and were skipped")
     if log.cut:
-        notes.append("the compressed log is cut off: scans after the cut are missing")
+        notes.append("the compressed log is cut off: later scans are missing")
     if log.slam:
         notes.append("GMapping wrote this log: its odometry was corrected by SLAM")
     return tuple(notes)
