@@ -140,9 +140,9 @@ def test_max_scans_limits_all_arrays(write: Write) -> None:
     ],
 )
 def test_inconsistent_arrays_are_rejected(
-    write: Write, changes: dict[str, Any], message: str
+    write: Write, changes: dict[str, Any], says: str
 ) -> None:
-    with pytest.raises(ScanError, match=message):
+    with pytest.raises(ScanError, match=says):
         load_npz(write(**changes))
 
 
