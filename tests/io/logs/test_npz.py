@@ -139,9 +139,7 @@ def test_max_scans_limits_all_arrays(write: Write) -> None:
         ({"T_base_laser": [0.0, np.nan, 0.0]}, "finite numbers"),
     ],
 )
-def test_inconsistent_arrays_are_rejected(
-    write: Write, changes: dict[str, Any], says: str
-) -> None:
+def test_inconsistent_arrays_are_rejected(write: Write, changes: dict[str, Any], says: str) -> None:
     with pytest.raises(ScanError, match=says):
         load_npz(write(**changes))
 
