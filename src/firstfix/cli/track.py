@@ -95,6 +95,7 @@ def track(
     import numpy as np
 
     from firstfix.cli.track_answers import track_json, track_text, track_title, trajectory_of
+    from firstfix.fields.map_fields import MapFields
     from firstfix.lab.experiments.drive import known_odometry, plan_drive
     from firstfix.lab.experiments.drive_tracking import check_start, follow_drive, make_tracker
     from firstfix.lab.metrics.track_metrics import summarize_track
@@ -115,11 +116,11 @@ def track(
         drive = plan_drive(recording, begin.T_map_base)
         check_start(grid, drive.begin_at)
         with working("preparing the map"):
-            tracker = make_tracker(grid, config)
+            tracker, fields = make_tracker(grid, config), MapFields(grid)
         rng = np.random.default_rng(config.seed)
         tracked = []
         with progress(len(drive.sights), "tracking") as done:
-            for scan in follow_drive(drive, tracker, config, begin.covariance, rng):
+            for scan in follow_drive(drive, tracker, config, begin.covariance, rng, fields):
                 tracked.append(scan)
                 if keeper is not None:
                     keeper.offer(_saved(scan, key))

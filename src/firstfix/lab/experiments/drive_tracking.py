@@ -18,7 +18,9 @@ from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import MapFields
 from firstfix.lab.experiments.drive import Drive, Sight
+from firstfix.localizer.pose_fusion import fuse_with_scan
 
 
 def spread(sigma_m: float, sigma_deg: float) -> NDArray[np.float64]:
@@ -43,7 +45,7 @@ class TrackedScan:
     T_map_base : SE2
         The tracked pose.
     covariance : ndarray, shape (3, 3)
-        Of x (m), y (m), yaw (rad) in the map frame, at the last update.
+        Of x (m), y (m), yaw (rad) in the map frame.
     T_map_odom : SE2
         Drift of the odometry.
     updated : bool
@@ -81,6 +83,7 @@ def follow_drive(
     config: AmclConfig,
     start_covariance: NDArray[np.float64],
     rng: np.random.Generator,
+    fields: MapFields | None = None,
 ) -> Iterator[TrackedScan]:
     """Follow a drive.
 
@@ -96,6 +99,9 @@ def follow_drive(
         Of the first start, x (m), y (m), yaw (rad); later ones are at true poses: `TRUE_START`.
     rng : numpy.random.Generator
         Source of randomness.
+    fields : MapFields, optional
+        The prepared map, by which each pose is refined as a localizer does it; None leaves the
+        poses of the filter.
 
     Yields
     ------
@@ -114,8 +120,20 @@ def follow_drive(
         else:
             assert track is not None  # noqa: S101 - the first scan of a drive has a start
             track = tracker.follow(track, T_odom_base, scan, rng)
-        cpu_s = time.thread_time() - cpu
-        yield _tracked(sight, track, cpu_s, is_new=track is not before)
+        T_map_odom, found = track.T_map_odom, track.state.estimate.covariance
+        if fields is not None:
+            pose, found = fuse_with_scan(T_map_odom @ T_odom_base, found, scan, fields)
+            T_map_odom = pose @ T_odom_base.inverse()
+        yield TrackedScan(
+            sight=sight,
+            T_map_base=T_map_odom @ T_odom_base,
+            covariance=found,
+            T_map_odom=T_map_odom,
+            updated=track is not before,
+            particles=len(track.state.particles),
+            elsewhere=track.state.elsewhere,
+            cpu_s=time.thread_time() - cpu,
+        )
 
 
 def check_start(grid: OccupancyGrid, T_map_base: SE2) -> None:
@@ -137,18 +155,4 @@ def check_start(grid: OccupancyGrid, T_map_base: SE2) -> None:
         f"y {south:.2f} to {north:.2f} m",
         received=f"x {T_map_base.x:.2f} m, y {T_map_base.y:.2f} m",
         remedy="check the pose, and that map and log are of one building",
-    )
-
-
-def _tracked(sight: Sight, track: Track, cpu_s: float, *, is_new: bool) -> TrackedScan:
-    T_map_odom = track.T_map_odom
-    return TrackedScan(
-        sight=sight,
-        T_map_base=T_map_odom @ sight.T_odom_base,
-        covariance=track.state.estimate.covariance,
-        T_map_odom=T_map_odom,
-        updated=is_new,
-        particles=len(track.state.particles),
-        elsewhere=track.state.elsewhere,
-        cpu_s=cpu_s,
     )
