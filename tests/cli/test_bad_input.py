@@ -100,6 +100,12 @@ def test_a_picture_of_no_known_kind(cli, unique: Files, name: str) -> None:
     assert_one_line(cli("map", "show", unique[0], "--plot", name), name)
 
 
+def test_the_folder_of_a_picture_must_exist(cli, unique: Files) -> None:
+    for command in (("locate", *unique), ("demo",), ("map", "show", unique[0])):
+        assert_one_line(cli(*command, "--plot", "missing/a.png"), "no folder missing")
+    assert not Path("missing").exists()
+
+
 def test_a_picture_without_matplotlib(cli, unique: Files, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     assert_one_line(cli("locate", *unique, "--plot", "a.png"), "firstfix[plot]")

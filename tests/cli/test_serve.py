@@ -125,6 +125,7 @@ def test_a_port_that_is_taken(cli) -> None:
         (("house", "--token", "short"), ("8 characters",)),
         (("house", "scan:=front"), ("scan:=front", "--robot")),
         (("atlantis",), ("office, rooms", "atlantis")),
+        (("nomap.yaml",), ("no such file: nomap.yaml",)),
     ],
 )
 def test_what_cannot_be_served(cli, arguments: tuple[str, ...], words: tuple[str, ...]) -> None:

@@ -21,12 +21,12 @@ def result(hall_plan: ff.OccupancyGrid) -> ff.LocateResult:
 
 
 def test_the_plot_shows_map_scan_and_places(result: ff.LocateResult, tmp_path: Path) -> None:
-    drawn = result.plot(tmp_path / "new" / "place.png", truth=ff.SE2(3.0, 2.0, 0.5))
+    drawn = result.plot(tmp_path / "place.png", truth=ff.SE2(3.0, 2.0, 0.5))
     whole, near = drawn.axes
     assert len(whole.images) == len(near.images) == 1
     assert len(near.collections) >= 1
     assert "truth" in near.get_legend_handles_labels()[1]
-    with Image.open(tmp_path / "new" / "place.png") as image:
+    with Image.open(tmp_path / "place.png") as image:
         assert image.width > 1000
 
 

@@ -70,7 +70,7 @@ def world_or_map(name: str) -> OccupancyGrid:
     if not Path(name).exists():
         raise InputError(
             expected=f"a world ({', '.join(WORLDS)}) or a map's YAML",
-            received=f"{name}, which is neither",
-            remedy="choose another one",
+            received=f"no such file: {name}",
+            remedy="check the path or the name",
         )
     return load_map(Path(name))

@@ -37,13 +37,19 @@ def check_path(path: Path) -> None:
     Raises
     ------
     InputError
-        If its suffix names no known format.
+        If its suffix names no known format, or its folder does not exist.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(
             expected=f"a picture that ends in {', '.join(SUFFIXES)}",
             received=f"{path}",
             remedy="name the file by its format, such as place.png",
+        )
+    if not path.absolute().parent.is_dir():
+        raise InputError(
+            expected=f"an existing folder for the picture {path.name}",
+            received=f"no folder {path.parent}",
+            remedy="create the folder, or choose another path",
         )
 
 
@@ -123,7 +129,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a figure in the format its name ends in; missing folders are made.
+    """Write a figure in the format of its suffix.
 
     Returns
     -------
@@ -138,7 +144,6 @@ def save_figure(figure: Figure, path: Path) -> Path:
     check_path(path)
     _lay_out(figure)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         if path.suffix.lower() == ".png":
             _with_few_colours(figure).save(path, optimize=True)
         else:

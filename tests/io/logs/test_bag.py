@@ -1,6 +1,8 @@
 """Recordings from ROS bags of both ROS and all storages: which scans, in which order."""
 
 import math
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ from firstfix.core.errors import ScanError
 from firstfix.core.scan import Mounting
 from firstfix.core.se2 import SE2
 from firstfix.io.logs.bag import load_bag
+from firstfix.io.logs.bag_file import SCAN, BagFile
 
 
 def test_scans_come_with_the_place_of_their_sensor_and_odometry(bag) -> None:
@@ -105,6 +108,28 @@ def test_the_first_scans_are_the_first_by_stamp(bag) -> None:
         recording = load_bag(path, max_scans=n)
         assert [scan.stamp for scan in recording.scans] == sorted(late)[:n]
         assert "sorted by stamp" in recording.notes[-1]
+
+
+@pytest.mark.parametrize("name", ["drive", "drive/drive.db3"])
+def test_reading_a_ros2_bag_writes_no_files(new_bag, tmp_path: Path, name: str) -> None:
+    """Also with a write-ahead log, which rosbag2 uses, and in a read-only folder."""
+    folder = new_bag("sqlite3", tmp_path / "drive").robot().write()
+    with closing(sqlite3.connect(folder / "drive.db3")) as database:
+        assert database.execute("PRAGMA journal_mode=WAL").fetchone() == ("wal",)
+    before = sorted(path.name for path in folder.iterdir())
+    seen = set()
+    folder.chmod(0o500)
+    try:
+        with BagFile(tmp_path / name) as bag:
+            for _ in bag.messages(SCAN, ["/scan"]):
+                seen.add(tuple(sorted(path.name for path in folder.iterdir())))
+        assert len(load_bag(tmp_path / name)) == 3
+    finally:
+        folder.chmod(0o700)
+    assert seen == {tuple(before)}
+    assert (
+        sorted(path.name for path in folder.iterdir()) == before == ["drive.db3", "metadata.yaml"]
+    )
 
 
 @pytest.mark.shared
