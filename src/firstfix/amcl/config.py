@@ -10,7 +10,13 @@ from firstfix.core.settings import check_settings, setting
 
 
 class MotionModel(Enum):
-    """How the base moves; the values are Nav2's plugin names."""
+    """How the base moves; the values are Nav2's plugin names.
+
+    Examples
+    --------
+    >>> ff.AmclConfig(robot_model_type="stationary").robot_model_type
+    <MotionModel.STATIONARY: 'stationary'>
+    """
 
     DIFFERENTIAL = "nav2_amcl::DifferentialMotionModel"
     OMNIDIRECTIONAL = "nav2_amcl::OmniMotionModel"
@@ -18,7 +24,13 @@ class MotionModel(Enum):
 
 
 class SensorModel(Enum):
-    """How a scan weighs a particle; the values are Nav2's."""
+    """How a scan weighs a particle; the values are Nav2's.
+
+    Examples
+    --------
+    >>> ff.AmclConfig(laser_model_type="beam").laser_model_type
+    <SensorModel.BEAM: 'beam'>
+    """
 
     LIKELIHOOD_FIELD = "likelihood_field"
     LIKELIHOOD_FIELD_PROB = "likelihood_field_prob"
@@ -37,6 +49,12 @@ class AmclConfig:
     ------
     InputError
         If a setting has the wrong type or is out of its range, or two contradict each other.
+
+    Examples
+    --------
+    >>> config = ff.AmclConfig(laser_model_type="beam", max_beams=30)
+    >>> config.laser_model_type
+    <SensorModel.BEAM: 'beam'>
     """
 
     alpha1: float = setting(0.2, "rotation noise from rotation", 0.0)

@@ -39,12 +39,6 @@ def as_member(kind: type[Member], value: object, name: str) -> Member:
     ------
     InputError
         If the string names no member, or the value is no string.
-
-    Examples
-    --------
-    >>> from firstfix.core.scan import Mounting
-    >>> as_member(Mounting, "upside_down", "mounting")
-    <Mounting.UPSIDE_DOWN: -1>
     """
     if isinstance(value, kind):
         return value
@@ -80,11 +74,6 @@ def as_pose(value: object, name: str) -> SE2:
     ------
     InputError
         If the value is neither.
-
-    Examples
-    --------
-    >>> as_pose((0.1, 0.0, 0.0), "T_base_laser")
-    SE2(x=0.1, y=0.0, yaw=0.0)
     """
     if isinstance(value, SE2):
         return value

@@ -12,7 +12,16 @@ from __future__ import annotations
 
 
 class FirstfixError(Exception):
-    """Root of every error that firstfix raises on purpose."""
+    """Root of every error that firstfix raises on purpose.
+
+    Examples
+    --------
+    >>> try:
+    ...     ff.load_map("missing.yaml")
+    ... except ff.FirstfixError as error:
+    ...     print(type(error).__name__)
+    MapError
+    """
 
 
 class InputError(FirstfixError):
@@ -29,6 +38,13 @@ class InputError(FirstfixError):
         What came instead.
     remedy : str
         What the user can do.
+
+    Examples
+    --------
+    >>> ff.ScanMatcher(grid, method="quick")
+    Traceback (most recent call last):
+    ...
+    firstfix.core.errors.InputError: expected method as one of fast, paper, paper-basic, ...
     """
 
     def __init__(
@@ -45,11 +61,27 @@ class InputError(FirstfixError):
 
 
 class MapError(InputError):
-    """A map that cannot be used."""
+    """A map that cannot be used.
+
+    Examples
+    --------
+    >>> ff.OccupancyGrid(np.zeros((0, 3), np.int8), resolution=0.05)
+    Traceback (most recent call last):
+    ...
+    firstfix.core.errors.MapError: expected a map of at least one row and one column, ...
+    """
 
 
 class ScanError(InputError):
-    """A scan, or a log of scans, that cannot be used."""
+    """A scan, or a log of scans, that cannot be used.
+
+    Examples
+    --------
+    >>> ff.LaserScan([1.0, 2.0], angle_min=0.0, angle_increment=0.1, range_min=5.0, range_max=1.0)
+    Traceback (most recent call last):
+    ...
+    firstfix.core.errors.ScanError: expected a range_max above range_min, ...
+    """
 
 
 def _rebuild(

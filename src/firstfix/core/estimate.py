@@ -25,7 +25,13 @@ if TYPE_CHECKING:
 
 
 class Verdict(Enum):
-    """How far a result can be trusted."""
+    """How far a result can be trusted.
+
+    Examples
+    --------
+    >>> ff.ScanMatcher(grid).locate(scan).verdict is ff.Verdict.UNIQUE
+    True
+    """
 
     UNIQUE = "UNIQUE"
     AMBIGUOUS = "AMBIGUOUS"
@@ -48,6 +54,12 @@ class Evidence:
         Beams that end where the map knows nothing.
     beams : int
         Number of beams used.
+
+    Examples
+    --------
+    >>> evidence = ff.ScanMatcher(grid).locate(scan).best.evidence
+    >>> evidence.explained > 0.9
+    True
     """
 
     explained: float
@@ -77,6 +89,14 @@ class Hypothesis:
     id : int or None
         Number that a localizer gives to the place and keeps as long as the place is listed; None
         in the answer to a single scan.
+
+    Examples
+    --------
+    >>> best = ff.ScanMatcher(grid).locate(scan).best
+    >>> round(best.pose.x, 1), round(best.pose.y, 1), best.probability > 0.95
+    (2.0, 1.5, True)
+    >>> best.covariance.shape
+    (3, 3)
     """
 
     pose: SE2
@@ -121,6 +141,11 @@ class SearchReport:
         Share of them that was scored, 0 to 1; less than 1 only with a small ``max_poses``.
     proven : bool
         True if no pose of the search grid has a lower search score than the best one found.
+
+    Examples
+    --------
+    >>> ff.ScanMatcher(grid).locate(scan).search.proven
+    True
     """
 
     poses: int
@@ -148,6 +173,14 @@ class LocateResult:
         The map that was searched, for pictures.
     scan : LaserScan or None
         The scan, for pictures.
+
+    Examples
+    --------
+    >>> result = ff.ScanMatcher(grid).locate(scan)
+    >>> print(result)
+    UNIQUE (2.00, 1.50) m 28...° ±... cm, p 1.00
+    >>> result.to_dict()["verdict"]
+    'UNIQUE'
     """
 
     verdict: Verdict

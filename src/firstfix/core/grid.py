@@ -46,6 +46,14 @@ class OccupancyGrid:
     ------
     MapError
         If the shape, a value or the resolution cannot belong to a map.
+
+    Examples
+    --------
+    >>> cells = np.zeros((80, 120), np.int8)  # free
+    >>> cells[[0, -1]] = cells[:, [0, -1]] = 100  # walls around
+    >>> room = ff.OccupancyGrid(cells, resolution=0.05, T_map_grid=(-3.0, -2.0, 0.0))
+    >>> room.extent
+    (-3.0, 3.0, -2.0, 2.0)
     """
 
     cells: NDArray[np.int8]

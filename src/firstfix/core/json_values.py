@@ -7,13 +7,7 @@ from typing import Any
 
 
 def finite(value: Any) -> Any:
-    """Replace NaN and infinity, at any depth of dicts and lists, by None.
-
-    Examples
-    --------
-    >>> finite({"pose": [1.0, float("nan")]})
-    {'pose': [1.0, None]}
-    """
+    """Replace NaN and infinity, at any depth of dicts and lists, by None."""
     if isinstance(value, dict):
         return {key: finite(inner) for key, inner in value.items()}
     if isinstance(value, list):

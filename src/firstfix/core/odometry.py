@@ -26,6 +26,11 @@ class Odometry:
     ------
     InputError
         If the stamp is not finite.
+
+    Examples
+    --------
+    >>> ff.Odometry(stamp=0.1, T_odom_base=(1.0, 2.0, 0.5)).T_odom_base
+    SE2(x=1.0, y=2.0, yaw=0.5)
     """
 
     stamp: float
@@ -37,7 +42,13 @@ class Odometry:
 
 
 class SignalKind(Enum):
-    """What sensors of the base can tell; the values are Kobuki's words."""
+    """What sensors of the base can tell; the values are Kobuki's words.
+
+    Examples
+    --------
+    >>> ff.SignalKind("cliff").means_lifted, ff.SignalKind("bumper").means_lifted
+    (True, False)
+    """
 
     CLIFF = "cliff"
     WHEEL_DROP = "wheel_drop"
@@ -67,6 +78,12 @@ class Signal:
     ------
     InputError
         If the stamp is not finite.
+
+    Examples
+    --------
+    >>> signal = ff.Signal(stamp=0.1, kind="wheel_drop", active=True)
+    >>> signal.kind.means_lifted
+    True
     """
 
     stamp: float

@@ -38,6 +38,14 @@ class Recording:
     ------
     ScanError
         If there is no scan, or truth or runs do not fit the scans.
+
+    Examples
+    --------
+    >>> recording = ff.Recording((scan,))
+    >>> recording
+    <Recording 1 scans in 0.0 s>
+    >>> [type(message).__name__ for message in recording.messages()]
+    ['LaserScan']
     """
 
     scans: tuple[LaserScan, ...]

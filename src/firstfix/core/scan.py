@@ -19,7 +19,13 @@ MAX_BEAMS = 100_000
 
 
 class Mounting(Enum):
-    """Which way up the sensor sits on the robot."""
+    """Which way up the sensor sits on the robot.
+
+    Examples
+    --------
+    >>> ff.Lidar(mounting="upside_down").mounting
+    <Mounting.UPSIDE_DOWN: -1>
+    """
 
     UPRIGHT = 1
     UPSIDE_DOWN = -1
@@ -51,6 +57,22 @@ class LaserScan:
     ------
     ScanError
         If these numbers cannot describe a scan. Legal scans that say nothing are accepted.
+
+    Examples
+    --------
+    >>> ranges = np.full(360, 2.0)
+    >>> scan = ff.LaserScan(
+    ...     ranges,
+    ...     angle_min=-np.pi,
+    ...     angle_increment=np.pi / 180,
+    ...     range_min=0.1,
+    ...     range_max=12.0,
+    ...     T_base_laser=(0.1, 0.0, 0.0),
+    ... )
+    >>> scan
+    <LaserScan 360 beams over 360°, 360 hits, stamp 0.000>
+    >>> scan.points().shape
+    (360, 2)
     """
 
     ranges: NDArray[np.float32]

@@ -28,6 +28,16 @@ class SE2:
         Position of the origin of b in a, m.
     yaw : float
         Direction of the x axis of b in a, rad, counter-clockwise; stored in (-π, π].
+
+    Examples
+    --------
+    >>> T_map_base = ff.SE2(2.0, 1.0, np.pi / 2)
+    >>> T_base_laser = ff.SE2(0.1, 0.0, 0.0)
+    >>> x, y, yaw = T_map_base @ T_base_laser
+    >>> round(x, 3), round(y, 3)
+    (2.0, 1.1)
+    >>> T_map_base.apply(np.array([[1.0, 0.0]])).round(3)
+    array([[2., 2.]])
     """
 
     x: float
@@ -74,7 +84,7 @@ class SE2:
 
         Examples
         --------
-        >>> SE2.from_quaternion(1.0, 2.0, (0.0, 0.0, 0.0, 1.0))
+        >>> ff.SE2.from_quaternion(1.0, 2.0, (0.0, 0.0, 0.0, 1.0))
         SE2(x=1.0, y=2.0, yaw=0.0)
         """
         numbers = [float(part) for part in quaternion]

@@ -27,6 +27,12 @@ class Trajectory:
     ------
     InputError
         If the lengths differ, a number is not finite or the stamps go back.
+
+    Examples
+    --------
+    >>> path = ff.Trajectory([0.0, 1.0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    >>> path.at(0.5)
+    SE2(x=0.5, y=0.0, yaw=0.0)
     """
 
     stamps: NDArray[np.float64]

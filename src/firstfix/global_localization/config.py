@@ -11,7 +11,13 @@ from firstfix.fields.search_grid import MAX_POSITIONS
 
 
 class Method(Enum):
-    """How the map is searched."""
+    """How the map is searched.
+
+    Examples
+    --------
+    >>> ff.ScanMatcher(grid, method="paper").method
+    <Method.PAPER: 'paper'>
+    """
 
     FAST = "fast"
     PAPER = "paper"
@@ -30,6 +36,11 @@ class LocateConfig:
     ------
     InputError
         If a setting has the wrong type or is out of its range.
+
+    Examples
+    --------
+    >>> config = ff.LocateConfig(unique_probability=0.99)
+    >>> matcher = ff.ScanMatcher(grid, config=config)
     """
 
     max_poses: int = setting(

@@ -57,6 +57,15 @@ class ScanMatcher:
         If an argument has the wrong type, or no method has this name.
     MapError
         If the map has no wall, or no free space to be in.
+
+    Examples
+    --------
+    >>> matcher = ff.ScanMatcher(grid)
+    >>> result = matcher.locate(scan)
+    >>> result.verdict
+    <Verdict.UNIQUE: 'UNIQUE'>
+    >>> result.best.pose.distance_to(ff.SE2(2.0, 1.5, 0.5)) < 0.05
+    True
     """
 
     def __init__(

@@ -25,6 +25,10 @@ class MonitorConfig:
     ------
     InputError
         If a setting is out of its range.
+
+    Examples
+    --------
+    >>> config = ff.LocalizerConfig(monitor=ff.MonitorConfig(lost_after_s=5.0))
     """
 
     doubtful_cost: float = setting(
@@ -83,6 +87,12 @@ class LocalizerConfig:
         Pose tracking.
     monitor : MonitorConfig
         Verification of the pose, and the choice between several places.
+
+    Examples
+    --------
+    >>> config = ff.LocalizerConfig(amcl=ff.AmclConfig(max_particles=500))
+    >>> ff.Localizer(config).config.amcl.max_particles
+    500
     """
 
     locate: LocateConfig = field(default_factory=LocateConfig)

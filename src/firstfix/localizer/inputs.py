@@ -22,6 +22,12 @@ class NewMap:
         Time, s.
     grid : OccupancyGrid
         The map.
+
+    Examples
+    --------
+    >>> outputs = ff.Localizer().handle(ff.NewMap(0.0, grid))
+    >>> outputs[0].state
+    <State.SEARCHING: 'SEARCHING'>
     """
 
     stamp: float
@@ -46,6 +52,11 @@ class PoseHint:
     hypothesis_id : int or None
         The place of the last `Hypotheses` that is meant. Its pose at present replaces
         `T_map_base`; if the place is no longer listed, the hint is refused.
+
+    Examples
+    --------
+    >>> hint = ff.PoseHint(0.0, ff.SE2(2.0, 1.5, 0.5), source="the operator")
+    >>> outputs = ff.Localizer().handle(hint)
     """
 
     stamp: float
@@ -65,6 +76,10 @@ class Reset:
     ----------
     stamp : float
         Time, s.
+
+    Examples
+    --------
+    >>> outputs = ff.Localizer().handle(ff.Reset(stamp=0.0))
     """
 
     stamp: float
@@ -78,6 +93,11 @@ class NoMotionUpdate:
     ----------
     stamp : float
         Time, s.
+
+    Examples
+    --------
+    >>> localizer = ff.Localizer()
+    >>> outputs = localizer.handle(ff.NoMotionUpdate(stamp=0.0))
     """
 
     stamp: float

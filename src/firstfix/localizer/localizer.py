@@ -52,6 +52,17 @@ class Localizer:
         Settings.
     cache_dir : Path, optional
         Folder of prepared maps; by default every map is prepared anew.
+
+    Examples
+    --------
+    >>> localizer = ff.Localizer()
+    >>> outputs = localizer.handle(ff.NewMap(0.0, grid))
+    >>> outputs += localizer.handle(ff.Odometry(0.0, (0.0, 0.0, 0.0)))
+    >>> outputs += localizer.handle(scan)
+    >>> [type(output).__name__ for output in outputs]
+    ['Status', 'InitialPose', 'TrackedPose', 'Status']
+    >>> localizer.state
+    <State.LOCALIZED: 'LOCALIZED'>
     """
 
     def __init__(

@@ -24,6 +24,11 @@ class InitialPose:
         Where.
     covariance : ndarray, shape (3, 3)
         Of x (m), y (m), yaw (rad) in the map frame.
+
+    Examples
+    --------
+    >>> output = ff.InitialPose(0.1, ff.SE2(2.0, 1.5, 0.5), np.diag([1e-4, 1e-4, 1e-4]))
+    >>> x, y, yaw = output.T_map_base
     """
 
     stamp: float
@@ -45,6 +50,12 @@ class TrackedPose:
         Of x (m), y (m), yaw (rad) in the map frame.
     T_map_odom : SE2
         Drift of the odometry.
+
+    Examples
+    --------
+    >>> pose = ff.SE2(2.0, 1.5, 0.5)
+    >>> output = ff.TrackedPose(0.1, pose, np.diag([1e-4, 1e-4, 1e-4]), T_map_odom=pose)
+    >>> x, y, yaw = output.T_map_base
     """
 
     stamp: float
@@ -64,6 +75,13 @@ class Hypotheses:
     places : tuple of Hypothesis
         Most likely first. Each has an `id`, which stays the same as long as the place is listed.
         While the robot rests and no other place comes up, the order stays the same, too.
+
+    Examples
+    --------
+    >>> best = ff.ScanMatcher(grid).locate(scan).best
+    >>> output = ff.Hypotheses(stamp=0.0, places=(best,))
+    >>> [place.pose for place in output.places] == [best.pose]
+    True
     """
 
     stamp: float
@@ -84,6 +102,12 @@ class MotionRequest:
         Then drive, m; 0 to turn only.
     gain : float
         Share of the beams by which the best place would differ from the most similar other one.
+
+    Examples
+    --------
+    >>> request = ff.MotionRequest(stamp=0.1, turn=1.57, ahead=0.5, gain=0.3)
+    >>> f"turn {request.turn} rad, then drive {request.ahead} m"
+    'turn 1.57 rad, then drive 0.5 m'
     """
 
     stamp: float
@@ -111,6 +135,12 @@ class Status:
         the evidence has decided, 0 where no place is known.
     chosen_by : str or None
         Source of the hint that chose the published pose, until the evidence decides.
+
+    Examples
+    --------
+    >>> status = ff.Localizer().handle(ff.NewMap(0.0, grid))[0]
+    >>> status.state.value
+    'SEARCHING'
     """
 
     stamp: float

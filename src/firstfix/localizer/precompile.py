@@ -40,6 +40,10 @@ def precompile(config: AmclConfig | None = None, methods: Iterable[Method] = ())
         Its sensor model and motion model choose among the kernels.
     methods : iterable of Method
         Methods of search besides the default one.
+
+    Examples
+    --------
+    >>> ff.precompile()
     """
     localizer = Localizer(LocalizerConfig(amcl=config or AmclConfig()))
     grid = small_room()

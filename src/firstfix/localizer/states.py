@@ -6,7 +6,13 @@ from enum import Enum
 
 
 class State(Enum):
-    """What a localizer is doing. The ROS status, the HTTP API and the page use these names."""
+    """What a localizer is doing. The ROS status, the HTTP API and the page use these names.
+
+    Examples
+    --------
+    >>> ff.Localizer().state
+    <State.NO_MAP: 'NO_MAP'>
+    """
 
     NO_MAP = "NO_MAP"
     SEARCHING = "SEARCHING"
@@ -17,7 +23,13 @@ class State(Enum):
 
 
 class Event(Enum):
-    """What can change the state."""
+    """What can change the state.
+
+    Examples
+    --------
+    >>> ff.Event("picked up")
+    <Event.PICKED_UP: 'picked up'>
+    """
 
     MAP_RECEIVED = "map received"
     HINT_RECEIVED = "hint received"

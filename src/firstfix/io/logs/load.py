@@ -37,6 +37,12 @@ def load_recording(
     ------
     ScanError
         If the path leads to nothing that can be read.
+
+    Examples
+    --------
+    >>> ff.save_recording(ff.Recording((scan,)), "scans.npz")
+    >>> ff.load_recording("scans.npz")
+    <Recording 1 scans in 0.0 s>
     """
     path = Path(path)
     suffix = _suffix(path)

@@ -148,6 +148,10 @@ def save_recording(recording: Recording, path: str | Path) -> None:
         If the scans are not from one sensor.
     InputError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> ff.save_recording(ff.Recording((scan,)), "scans.npz")
     """
     sensors = {_sensor(scan) for scan in recording.scans}
     if len(sensors) != 1:

@@ -45,6 +45,11 @@ def save_trajectory(trajectory: Trajectory, path: str | os.PathLike[str]) -> Non
     ------
     InputError
         If there is no pose, or the file cannot be written; an old file is then as it was.
+
+    Examples
+    --------
+    >>> path = ff.Trajectory([0.0, 1.0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    >>> ff.save_trajectory(path, "path.tum")
     """
     if len(trajectory) == 0:
         raise _empty("a trajectory without poses", "record at least one pose")
@@ -68,6 +73,13 @@ def load_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     ------
     InputError
         If the file cannot be read, or a line is not a planar pose with a stamp in order.
+
+    Examples
+    --------
+    >>> path = ff.Trajectory([0.0, 1.0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    >>> ff.save_trajectory(path, "path.tum")
+    >>> ff.load_trajectory("path.tum")
+    <Trajectory 2 poses in 1.0 s>
     """
     path = Path(path)
     numbers = array("d")

@@ -48,6 +48,12 @@ def load_map(path: str | os.PathLike[str]) -> OccupancyGrid:
     ------
     MapError
         If the YAML or the image is missing, damaged, too large or not usable for a map server.
+
+    Examples
+    --------
+    >>> path = ff.save_map(grid, "map.yaml")
+    >>> np.array_equal(ff.load_map("map.yaml").cells, grid.cells)
+    True
     """
     header = read_yaml(path)
     image = read_image(header.image)
@@ -93,6 +99,11 @@ def save_map(grid: OccupancyGrid, yaml_path: str | os.PathLike[str]) -> Path:
     ------
     MapError
         If the name has another suffix, or the files cannot be written.
+
+    Examples
+    --------
+    >>> ff.save_map(grid, "map.yaml").name
+    'map.yaml'
     """
     path = Path(yaml_path)
     if path.suffix not in (".yaml", ".yml"):

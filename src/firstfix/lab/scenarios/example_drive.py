@@ -34,6 +34,12 @@ def simulate_drive(world: str = "office", seed: int = 0) -> tuple[OccupancyGrid,
     ------
     InputError
         If no world has this name.
+
+    Examples
+    --------
+    >>> building, drive = ff.simulate_drive("rooms", seed=1)
+    >>> drive
+    <Recording ... scans in ... s, with odometry and ground truth>
     """
     if world not in WORLDS:
         raise InputError(

@@ -41,6 +41,12 @@ class Lidar:
     ------
     InputError
         If no sensor can be like this.
+
+    Examples
+    --------
+    >>> lidar = ff.Lidar(beams=90, sigma_m=0.01)
+    >>> lidar.scan(grid, ff.SE2(2.0, 1.5, 0.5), np.random.default_rng(0))
+    <LaserScan 90 beams over 360°, 90 hits, stamp 0.000>
     """
 
     beams: int = 360
