@@ -183,7 +183,13 @@ def _descend_field(found: NDArray[np.float64], beams: Beams, fields: MapFields) 
         unit="beam of a round",
         units=float(len(found) * len(sigmas) * len(hits)),
         call=lambda: refine._descend_field(
-            found.copy(), ends_x, ends_y, fields.squares, fields.distances, sigmas / resolution
+            found.copy(),
+            ends_x,
+            ends_y,
+            fields.squares,
+            fields.distances,
+            sigmas / resolution,
+            refine._STIFFNESS_BEAMS_M2 / resolution**2,
         ),
         working_set=working_set,
         moved=2 * 8 + 4 * (2 + 4),
@@ -198,7 +204,7 @@ def _descend_field(found: NDArray[np.float64], beams: Beams, fields: MapFields) 
 def _descend_rays(best: NDArray[np.float64], beams: Beams, fields: MapFields) -> Kernel:
     hits, resolution = beams.hits().thinned(refine.RAY_BEAMS), fields.grid.resolution
     cosines, sines, ranges = np.cos(hits.bearings), np.sin(hits.bearings), hits.ranges / resolution
-    widths = refine._RAY_SIGMA_M / resolution, refine._RAY_GATE_M / resolution
+    beyond = refine._RAY_GATE_M / resolution + refine._BEYOND_GATE_CELLS
     information, variances = np.empty((len(best), 4, 4)), np.empty(len(best))
 
     def call(kernel: Any = refine._descend_rays) -> None:
@@ -212,13 +218,13 @@ def _descend_rays(best: NDArray[np.float64], beams: Beams, fields: MapFields) ->
             fields.clearance,
             fields.squares,
             fields.distances,
-            widths,
+            resolution,
         )
 
     with mock.patch.object(refine, "_solve", wraps=refine._solve) as solved:
         call(refine._descend_rays.py_func)
     rounds = solved.call_count
-    leaps = _leaps_at(best, hits, ranges + widths[1] + 2.0, fields) / (len(best) * len(hits))
+    leaps = _leaps_at(best, hits, ranges + beyond, fields) / (len(best) * len(hits))
     mean_cells = float(ranges.mean())
     return Kernel(
         function=refine._descend_rays,

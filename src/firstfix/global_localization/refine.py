@@ -19,26 +19,58 @@ from firstfix.global_localization.beams import Beams
 FIELD_BEAMS = 60
 RAY_BEAMS = 180
 
-# The search grid leaves a pose up to 0.14 m and 1.4 degrees off: wide first, then as sharp as
-# maps are.
+# Width of the weights on the distance field. The search grid leaves a pose up to 0.14 m and 1.4
+# degrees off: wide first, then as sharp as maps are.
 _FIRST_SIGMA_M = 0.3
 _LAST_SIGMA_M = 0.07
 _FIELD_ROUNDS = 8
+# An end point this many sigmas from every wall hit something that is not in the map.
+_FIELD_GATE = 3.0
+
+# Prior of a step on the field, in beams that would hold the pose where it is: without it a corridor
+# lets the pose slide along. Half a beam for x and y; half a beam at a lever of 1 m for the heading.
+_STIFFNESS_BEAMS = 0.5
+_STIFFNESS_BEAMS_M2 = 0.5
+# The same on rays, which know more: just enough for a solvable system where no wall faces the ray.
+_RAY_STIFFNESS_BEAMS = 0.01
+_RAY_STIFFNESS_BEAMS_M2 = 0.0025
+
+# Longest step of a round: the linearisation holds for about the width of the weights. On the field
+# that is `_FIELD_GATE` sigmas and this heading.
+_FIELD_STEP_RAD = 0.05
+_RAY_STEP_M = 0.1
+_RAY_STEP_RAD = 0.03
 
 _RAY_ROUNDS = 8
-# A step below this many cells (and a hundredth of it in radians) is no step.
-_SETTLED = 0.005
+# A step below these is none: a thousandth of what maps are true to.
+_SETTLED_M = 0.00025
+_SETTLED_RAD = 5e-5
 _RAY_SIGMA_M = 0.1
 # Rays that differ by more met something else.
 _RAY_GATE_M = 0.3
+# A ray that grazes a wall (cosine of the angle to its normal) says nothing about the distance.
+_LEAST_SLANT = 0.1
 
-# A drawn or simulated wall is seen at the face of its cells, one that a mapping run has drawn lies
-# in their middle: 0.25 +- 0.25 cells behind the face, to be found with the pose.
-_WALL_DEPTH = 0.25
-_WALL_DEPTH_SIGMA = 0.25
+# Keeps the division by the longest coordinate of a step that is zero defined.
+_TINY = 1e-12
 
-# Neighbouring beams err together (the same wall drawn askew); this many beams say as much as one.
-_BEAMS_PER_WITNESS = 4.0
+# The rest is about how maps are drawn, so it is in cells. A drawn or simulated wall is seen at the
+# face of its cells, one that a mapping run has drawn lies in their middle: 0.25 +- 0.25 cells
+# behind the face, to be found with the pose; no more than half a cell a round.
+_WALL_DEPTH_CELLS = 0.25
+_WALL_DEPTH_SIGMA_CELLS = 0.25
+_WALL_DEPTH_STEP_CELLS = 0.5
+# The normal of a wall is taken one cell before its face: inside, the distance field is flat.
+_BEFORE_WALL_CELLS = 1.0
+# A ray is cast this far beyond the gate, so that one that meets nothing is beyond it too.
+_BEYOND_GATE_CELLS = 2.0
+# Slope of the distance field (cells over two cells) below which it has no direction.
+_FLAT = 1e-3
+# A quarter of the variance of a uniform error of one cell: a perfect drawing must not look exact.
+_LEAST_VARIANCE_CELLS2 = 1.0 / 48.0
+
+# Neighbouring beams err together (the same wall drawn askew): this many count as one.
+_BEAMS_PER_EFFECTIVE_BEAM = 4.0
 # However many beams agree, a map is not truer than a quarter of a cell and a tenth of a degree.
 _MAP_COVARIANCE = np.diag([0.25**2, 0.25**2, math.radians(0.1) ** 2])
 
@@ -76,6 +108,7 @@ def refine_on_field(
         fields.squares,
         fields.distances,
         sigmas / resolution,
+        _STIFFNESS_BEAMS_M2 / resolution**2,
     )
     return refined
 
@@ -118,11 +151,11 @@ def refine_on_rays(
         fields.clearance,
         fields.squares,
         fields.distances,
-        (_RAY_SIGMA_M / resolution, _RAY_GATE_M / resolution),
+        resolution,
     )
     # The depth of the walls is not asked for: invert first, then leave it out.
     covariances = np.linalg.inv(information)[:, :3, :3] * variances[:, None, None]
-    return refined, covariances * _BEAMS_PER_WITNESS + _MAP_COVARIANCE
+    return refined, covariances * _BEAMS_PER_EFFECTIVE_BEAM + _MAP_COVARIANCE
 
 
 @kernel
@@ -133,16 +166,16 @@ def _descend_field(
     squares: NDArray[np.uint16],
     distances: NDArray[np.float32],
     sigmas: NDArray[np.float64],
+    heading_stiffness: float,
 ) -> None:
     height, width = squares.shape
     A, L = np.empty((3, 3)), np.empty((3, 3))
     g = np.empty(3)
     for k in range(poses.shape[0]):
         for sigma in sigmas:
-            # A little stiffness (half a cell, two degrees): corridors must not slide away.
             A[:] = 0.0
-            A[0, 0] = A[1, 1] = 0.5
-            A[2, 2] = 200.0
+            A[0, 0] = A[1, 1] = _STIFFNESS_BEAMS
+            A[2, 2] = heading_stiffness
             g[:] = 0.0
             cos, sin = math.cos(poses[k, 2]), math.sin(poses[k, 2])
             for i in range(ends_x.shape[0]):
@@ -155,7 +188,7 @@ def _descend_field(
                 d00, d10 = distances[squares[cy, cx]], distances[squares[cy, cx + 1]]
                 d01, d11 = distances[squares[cy + 1, cx]], distances[squares[cy + 1, cx + 1]]
                 d = (d00 * (1 - u) + d10 * u) * (1 - v) + (d01 * (1 - u) + d11 * u) * v
-                if d > 3.0 * sigma:
+                if d > _FIELD_GATE * sigma:
                     continue
                 w = 1.0 / (1.0 + (d / sigma) ** 2) ** 2
                 jx = (d10 - d00) * (1 - v) + (d11 - d01) * v
@@ -171,10 +204,10 @@ def _descend_field(
                 g[1] += w * jy * d
                 g[2] += w * jt * d
             _solve(A, L, g)
-            shrink = min(1.0, 3.0 * sigma / max(abs(g[0]), abs(g[1]), 1e-12))
+            shrink = min(1.0, _FIELD_GATE * sigma / max(abs(g[0]), abs(g[1]), _TINY))
             poses[k, 0] -= shrink * g[0]
             poses[k, 1] -= shrink * g[1]
-            poses[k, 2] -= max(-0.05, min(0.05, g[2]))
+            poses[k, 2] -= _clipped(g[2], _FIELD_STEP_RAD)
 
 
 @kernel
@@ -209,38 +242,38 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
     clearance: NDArray[np.uint8],
     squares: NDArray[np.uint16],
     distances: NDArray[np.float32],
-    widths: tuple[float, float],
+    resolution: float,
 ) -> None:
-    sigma, gate = widths
+    sigma, gate = _RAY_SIGMA_M / resolution, _RAY_GATE_M / resolution
+    step, settled = _RAY_STEP_M / resolution, _SETTLED_M / resolution
     J = np.empty(4)
     L = np.empty((4, 4))
     g = np.empty(4)
     for k in range(poses.shape[0]):
         A = information[k]
-        depth = _WALL_DEPTH
+        depth = _WALL_DEPTH_CELLS
         for _ in range(_RAY_ROUNDS):
             A[:] = 0.0
-            A[0, 0] = A[1, 1] = 1e-2
-            A[2, 2] = 1.0
+            A[0, 0] = A[1, 1] = _RAY_STIFFNESS_BEAMS
+            A[2, 2] = _RAY_STIFFNESS_BEAMS_M2 / resolution**2
             g[:] = 0.0
             weights, squared = 0.0, 0.0
-            A[3, 3] = 1.0 / _WALL_DEPTH_SIGMA**2
-            g[3] = (depth - _WALL_DEPTH) / _WALL_DEPTH_SIGMA**2
+            A[3, 3] = 1.0 / _WALL_DEPTH_SIGMA_CELLS**2
+            g[3] = (depth - _WALL_DEPTH_CELLS) / _WALL_DEPTH_SIGMA_CELLS**2
             cos, sin = math.cos(poses[k, 2]), math.sin(poses[k, 2])
             for i in range(ranges.shape[0]):
                 dx = cos * cosines[i] - sin * sines[i]
                 dy = sin * cosines[i] + cos * sines[i]
-                expected = cast_ray_leaping(
-                    clearance, poses[k, 0], poses[k, 1], dx, dy, ranges[i] + gate + 2.0
-                )
+                reach = ranges[i] + gate + _BEYOND_GATE_CELLS
+                expected = cast_ray_leaping(clearance, poses[k, 0], poses[k, 1], dx, dy, reach)
                 nx, ny = _normal(
                     squares,
                     distances,
-                    poses[k, 0] + (expected - 1.0) * dx,
-                    poses[k, 1] + (expected - 1.0) * dy,
+                    poses[k, 0] + (expected - _BEFORE_WALL_CELLS) * dx,
+                    poses[k, 1] + (expected - _BEFORE_WALL_CELLS) * dy,
                 )
                 slant = nx * dx + ny * dy
-                if slant < 0.1:
+                if slant < _LEAST_SLANT:
                     continue
                 residual = (ranges[i] - expected) * slant - depth
                 if abs(residual) > gate:
@@ -256,14 +289,18 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
                 weights += w
                 squared += w * residual * residual
             _solve(A, L, g)
-            poses[k, 0] -= max(-2.0, min(2.0, g[0]))
-            poses[k, 1] -= max(-2.0, min(2.0, g[1]))
-            poses[k, 2] -= max(-0.03, min(0.03, g[2]))
-            depth -= max(-0.5, min(0.5, g[3]))
-            if abs(g[0]) + abs(g[1]) < _SETTLED and abs(g[2]) < 0.01 * _SETTLED:
+            poses[k, 0] -= _clipped(g[0], step)
+            poses[k, 1] -= _clipped(g[1], step)
+            poses[k, 2] -= _clipped(g[2], _RAY_STEP_RAD)
+            depth -= _clipped(g[3], _WALL_DEPTH_STEP_CELLS)
+            if abs(g[0]) + abs(g[1]) < settled and abs(g[2]) < _SETTLED_RAD:
                 break
-        # A quarter of the spread of a cell keeps a perfect drawing from looking exact.
-        variances[k] = max(squared / max(weights, 1.0), 1.0 / 48.0)
+        variances[k] = max(squared / max(weights, 1.0), _LEAST_VARIANCE_CELLS2)
+
+
+@kernel
+def _clipped(value: float, most: float) -> float:
+    return max(-most, min(most, value))
 
 
 @kernel
@@ -278,6 +315,6 @@ def _normal(
     gx = np.float64(distances[squares[row, column + 1]]) - distances[squares[row, column - 1]]
     gy = np.float64(distances[squares[row + 1, column]]) - distances[squares[row - 1, column]]
     length = math.hypot(gx, gy)
-    if length < 1e-3:
+    if length < _FLAT:
         return 0.0, 0.0
     return -gx / length, -gy / length

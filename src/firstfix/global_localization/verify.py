@@ -36,6 +36,9 @@ _INSIDE_WALL_COST = 6.0
 # A missing return may be glass or black paint: half as telling as a hit.
 _NO_RETURN_WEIGHT = 0.5
 
+# Distance from the walls that an end point outside the map is given: an outlier.
+_FAR_M = 10.0
+
 # An end point this near to a wall is explained by it.
 _EXPLAINED_M = 0.2
 
@@ -248,7 +251,7 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
             x = math.floor(poses[k, 0] + ranges[i] / resolution * dx)
             y = math.floor(poses[k, 1] + ranges[i] / resolution * dy)
             inside = 0 <= x < width and 0 <= y < height
-            distance = distances_m[squares[y, x]] if inside else 10.0
+            distance = distances_m[squares[y, x]] if inside else _FAR_M
             near = math.exp(-0.5 * (distance / _SIGMA_M) ** 2)
             cost += weights[i] * (differs - math.log(_INLIER * near + _OUTLIER))
             if through:
