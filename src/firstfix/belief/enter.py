@@ -1,0 +1,76 @@
+"""Places enter the belief: those that a view's own search of the whole map proposes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.belief.config import BeliefConfig
+from firstfix.belief.hints import Hint, hint_logs
+from firstfix.belief.planar import compose, inverse
+from firstfix.belief.tracks import BEAMS, Tracks
+from firstfix.belief.view import Observation, costs, settle
+from firstfix.core.estimate import SearchReport
+from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.search import search
+
+# With a hint, the search is asked for more places, so that some are near it.
+_DEEPER = 20
+# Log-likelihood from which on a place counts as near all hints.
+_NEAR = -1.0
+
+
+def propose(
+    window: Sequence[Observation],
+    hints: Sequence[Hint],
+    first_id: int,
+    fields: MapFields,
+    config: BeliefConfig,
+) -> tuple[Tracks, SearchReport]:
+    """Search the whole map for the newest view, and settle the best places on the walls.
+
+    Parameters
+    ----------
+    window : sequence of Observation
+        Oldest first; a first view is searched more deeply.
+    hints : sequence of Hint
+        The best places near these enter, too.
+    first_id : int
+        Id of the best place; the others follow.
+    fields : MapFields
+        The prepared map.
+    config : BeliefConfig
+        Settings.
+
+    Returns
+    -------
+    tracks : Tracks
+        Over the newest view only.
+    report : SearchReport
+        What was searched.
+    """
+    seen = window[-1]
+    sensor = seen.sensors[0]
+    most = config.first_shortlist if len(window) == 1 else config.shortlist
+    depth = most * _DEEPER if hints else most
+    candidates, report = search(sensor.beams, fields, depth, config.budget_s)
+    poses = compose(candidates.poses, inverse(sensor.T_base_laser))
+    if hints:
+        poses = poses[_best_and_hinted(poses, most, seen, hints, fields)]
+    poses = settle(poses, seen, fields)
+    ids = first_id + np.arange(len(poses))
+    return Tracks.at(poses, costs(poses, seen, BEAMS, fields), ids), report
+
+
+def _best_and_hinted(
+    poses: NDArray[np.float64],
+    most: int,
+    seen: Observation,
+    hints: Sequence[Hint],
+    fields: MapFields,
+) -> NDArray[np.int64]:
+    """Return the indices of the first places, and of as many that are near the hints."""
+    near = np.flatnonzero(hint_logs(poses, seen, hints, fields.grid) >= _NEAR)
+    return np.unique(np.concatenate([np.arange(min(most, len(poses))), near[:most]]))

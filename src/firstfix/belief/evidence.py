@@ -1,0 +1,82 @@
+"""What views say together, and how much of it is new."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.belief.view import Observation, motion
+
+# The power law of docs/decisions/0005 on the mean cost of all views. Its exponent grows with the
+# number of independent views, slowly: what is wrong in the map is wrong in several views.
+EXPONENT = 12.0
+EXPONENT_GROWTH = 0.5
+FLOOR = 0.2
+BEAMS_FOR_EXPONENT = 30
+
+# Mean cost at which the best place of a wrong map begins to be as good as the right one.
+WRONG_MAP_COST = 2.3
+
+# A view is new in full if it was taken this far from every later one, or turned by a field of view
+# (by a radian if that is narrower).
+NEW_M = 1.0
+NEW_LEAST_RAD = 1.0
+
+
+def novelty(window: Sequence[Observation]) -> NDArray[np.float64]:
+    """Return how much of each view is new, shape (v,): 1 for the newest, 0 to 1 for the others.
+
+    Parameters
+    ----------
+    window : sequence of Observation
+        Oldest first.
+    """
+    new = np.ones(len(window))
+    for i, early in enumerate(window[:-1]):
+        new[i] = min(1.0, *(_apart(early, late) for late in window[i + 1 :]))
+    return new
+
+
+def _apart(early: Observation, late: Observation) -> float:
+    path, turn = motion(early, late)
+    wide = max(NEW_LEAST_RAD, late.field_of_view)
+    return max(path * late.resolution / NEW_M, turn / wide)
+
+
+def exponent(views: float, beams: int) -> float:
+    """Return the exponent of the power law.
+
+    Parameters
+    ----------
+    views : float
+        Number of independent views, at least 1.
+    beams : int
+        Number of beams of a view.
+    """
+    growth = 1.0 + EXPONENT_GROWTH * math.log2(views)
+    return EXPONENT * growth * min(1.0, beams / BEAMS_FOR_EXPONENT)
+
+
+def shares(logs: NDArray[np.float64], power: float) -> tuple[NDArray[np.float64], float]:
+    """Return the probability of each place, shape (n,), and of a place that is not listed.
+
+    Parameters
+    ----------
+    logs : ndarray, shape (n,)
+        Log-likelihoods of separate places, priors included.
+    power : float
+        The exponent behind them.
+    """
+    all_logs = np.append(logs, log_likelihoods(np.array([WRONG_MAP_COST]), power))
+    likelihoods = np.exp(all_logs - all_logs.max())
+    likelihoods /= likelihoods.sum()
+    return likelihoods[:-1], float(likelihoods[-1])
+
+
+def log_likelihoods(mean_costs: NDArray[np.float64], power: float) -> NDArray[np.float64]:
+    """Turn joint mean costs into log-likelihoods, up to a constant; the same shape."""
+    logs: NDArray[np.float64] = -power * np.log(mean_costs + FLOOR)
+    return logs

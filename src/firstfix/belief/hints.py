@@ -1,0 +1,59 @@
+"""Priors that were given at some time, and what they say of the places now."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.belief.planar import between, compose, to_map
+from firstfix.belief.prior import Prior
+from firstfix.belief.view import Observation
+from firstfix.core.grid import OccupancyGrid
+
+# After so long a way odometry no longer tells where the prior was.
+_FADES_M = 10.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Hint:
+    """A prior, and where odometry was when it held.
+
+    Parameters
+    ----------
+    prior : Prior
+        Of the pose of the base in the map.
+    odometry : ndarray, shape (3,), or None
+        Pose of the base in the odometry frame, cells and rad; None until the first view.
+    """
+
+    prior: Prior
+    odometry: NDArray[np.float64] | None
+
+
+def hint_logs(
+    poses: NDArray[np.float64], seen: Observation, hints: Sequence[Hint], grid: OccupancyGrid
+) -> NDArray[np.float64]:
+    """Return what the hints say of poses at a view, shape (n,): log-likelihoods up to 0.
+
+    Parameters
+    ----------
+    poses : ndarray, shape (n, 3)
+        x, y (cells), heading (rad) of the base in the grid.
+    seen : Observation
+        The view.
+    hints : sequence of Hint
+        All with their odometry.
+    grid : OccupancyGrid
+        The map.
+    """
+    logs = np.zeros(len(poses))
+    for hint in hints:
+        if hint.odometry is None:
+            continue
+        back = between(seen.odometry, hint.odometry)
+        if np.hypot(back[0], back[1]) * grid.resolution <= _FADES_M:
+            logs += hint.prior.log_likelihood(to_map(compose(poses, back), grid))
+    return logs

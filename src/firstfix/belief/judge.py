@@ -1,0 +1,172 @@
+"""May the best place be published? The verdict, and the reason for a person."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.belief.evidence import exponent, log_likelihoods, shares
+from firstfix.belief.view import Observation, motion
+from firstfix.core.estimate import Verdict
+
+# Mean cost of a beam up to which a view is explained at a place. The wrong map begins at 2.3.
+EXPLAINED_COST = 1.6
+
+# A second decision counts from a view that was taken this far away, or turned by this much.
+SECOND_LOOK_M = 0.3
+SECOND_LOOK_RAD = math.radians(15.0)
+
+# A place with this share of the best one's probability is a rival.
+_RIVAL_SHARE = 0.1
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Favourite:
+    """A place that has been sure since some view.
+
+    Parameters
+    ----------
+    id : int
+        Of the place.
+    since : Observation
+        The first view that made it sure.
+    published : bool
+        True once the verdict has been UNIQUE.
+    """
+
+    id: int
+    since: Observation
+    published: bool
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Judgement:
+    """A verdict and what it rests on.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        Whether the best place may be published.
+    reason : str
+        The verdict in words.
+    favourite : Favourite or None
+        The place that is sure, if one is.
+    unexplained : bool
+        True if the best place does not explain the newest view.
+    """
+
+    verdict: Verdict
+    reason: str
+    favourite: Favourite | None
+    unexplained: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """What makes a place sure.
+
+    Parameters
+    ----------
+    probability : float
+        Least probability.
+    hinted : bool
+        True if a prior speaks for the best place: then one view is enough.
+    """
+
+    probability: float
+    hinted: bool
+
+
+def judge(
+    costs: NDArray[np.float64],
+    ids: NDArray[np.int64],
+    probabilities: NDArray[np.float64],
+    window: Sequence[Observation],
+    before: Favourite | None,
+    rule: Rule,
+) -> Judgement:
+    """Decide what a person, or a robot, may do with the best place.
+
+    A place is sure if its probability is high and it explains the newest view. It is published if
+    it stays sure in a second view from elsewhere; at once if a sensor that sees much is sure by its
+    newest scan alone, or if a prior speaks for it.
+
+    Parameters
+    ----------
+    costs : ndarray, shape (n, v)
+        Mean cost of a beam of each place at each view.
+    ids : ndarray of int64, shape (n,)
+        Of the places, most likely first.
+    probabilities : ndarray, shape (n,)
+        Of the places.
+    window : sequence of Observation
+        The views, oldest first.
+    before : Favourite or None
+        The favourite of the view before.
+    rule : Rule
+        What makes a place sure.
+
+    Returns
+    -------
+    Judgement
+        The verdict and its reason.
+    """
+    seen = window[-1]
+    elsewhere = 1.0 - float(probabilities.sum())
+    if len(ids) == 0 or elsewhere > 0.5:
+        return Judgement(Verdict.NO_MATCH, _nowhere(len(window)), None, unexplained=True)
+    unexplained = bool(costs[0, -1] > EXPLAINED_COST)
+    if unexplained:
+        reason = "the most likely place does not explain the latest view"
+        return Judgement(Verdict.AMBIGUOUS, reason, None, unexplained=True)
+    if probabilities[0] < rule.probability:
+        return Judgement(Verdict.AMBIGUOUS, _undecided(probabilities, len(window)), None)
+
+    known = before if before is not None and before.id == ids[0] else None
+    alone = seen.decides_alone and _alone(costs[:, -1], len(seen.beams)) >= rule.probability
+    published = alone or rule.hinted or (known is not None and _confirmed(known, seen))
+    since = seen if known is None else known.since
+    favourite = Favourite(int(ids[0]), since, published)
+    if published:
+        return Judgement(Verdict.UNIQUE, _sure(len(window), rule), favourite)
+    reason = (
+        f"one place has {probabilities[0]:.0%} of the probability, but this sensor needs a second "
+        f"view to be sure: drive {SECOND_LOOK_M} m or turn {math.degrees(SECOND_LOOK_RAD):.0f}°"
+    )
+    return Judgement(Verdict.AMBIGUOUS, reason, favourite)
+
+
+def _alone(newest: NDArray[np.float64], beams: int) -> float:
+    """Return the probability of the best place by the newest view alone."""
+    power = exponent(1.0, beams)
+    return float(shares(log_likelihoods(newest, power), power)[0][0])
+
+
+def _confirmed(known: Favourite, seen: Observation) -> bool:
+    path, turn = motion(known.since, seen)
+    far = path * seen.resolution >= SECOND_LOOK_M - 1e-9
+    return known.published or far or turn >= SECOND_LOOK_RAD
+
+
+def _sure(views: int, rule: Rule) -> str:
+    if rule.hinted:
+        return "the scan confirms the place that was given, and nowhere else fits nearly as well"
+    which = "the scan fits" if views == 1 else f"the latest {views} views fit"
+    return f"{which} here and nowhere else nearly as well"
+
+
+def _undecided(probabilities: NDArray[np.float64], views: int) -> str:
+    rivals = int(np.count_nonzero(probabilities >= _RIVAL_SHARE * probabilities[0]))
+    which = "the view" if views == 1 else f"the latest {views} views"
+    if rivals > 1:
+        return f"{rivals} places explain {which} about as well; motion may tell them apart"
+    return f"one place explains {which} best, but others not badly enough to be sure"
+
+
+def _nowhere(views: int) -> str:
+    which = "the view" if views == 1 else f"the latest {views} views"
+    return f"no place of the map explains {which}: wrong map, unmapped place or blocked sensor"

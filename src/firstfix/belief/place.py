@@ -1,0 +1,85 @@
+"""The places of a belief as others see them: pose in the map, covariance, evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.belief.planar import compose
+from firstfix.belief.tracks import Tracks
+from firstfix.belief.view import Observation
+from firstfix.core.estimate import Hypothesis
+from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.answer import verified_place
+from firstfix.global_localization.refine import refine_on_rays
+from firstfix.global_localization.verify import verify
+
+_MOST_LISTED = 24
+_LEAST_LISTED = 2
+_LISTED_SHARE = 1e-3
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Place:
+    """A place where the robot may be.
+
+    Parameters
+    ----------
+    id : int
+        The same from view to view, as long as the place is held.
+    hypothesis : Hypothesis
+        ``T_map_base``, its covariance, probability, and how the latest view agrees.
+    """
+
+    id: int
+    hypothesis: Hypothesis
+
+
+def listed_places(
+    tracks: Tracks,
+    probabilities: NDArray[np.float64],
+    seen: Observation,
+    step: SE2,
+    fields: MapFields,
+) -> tuple[Place, ...]:
+    """Describe the likeliest places, at most 24.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Most likely first.
+    probabilities : ndarray, shape (n,)
+        Of the tracks.
+    seen : Observation
+        The newest view.
+    step : SE2
+        Motion of the base since that view.
+    fields : MapFields
+        The prepared map.
+
+    Returns
+    -------
+    tuple of Place
+        Those with a share of a thousandth, and at least two if there are two.
+    """
+    worth = int(np.count_nonzero(probabilities >= _LISTED_SHARE))
+    n = min(len(tracks), _MOST_LISTED, max(_LEAST_LISTED, worth))
+    if n == 0:
+        return ()
+    sensor = seen.sensors[0]
+    lasers = compose(tracks.now[:n], sensor.T_base_laser)
+    _, covariances = refine_on_rays(lasers, sensor.beams, fields)
+    verification = verify(lasers, sensor.beams, fields)
+    found = [
+        verified_place(
+            fields.grid, sensor.scan, verification, i, covariances[i], float(probabilities[i])
+        )
+        for i in range(n)
+    ]
+    return tuple(
+        Place(int(name), replace(hypothesis, pose=hypothesis.pose @ step))
+        for name, hypothesis in zip(tracks.ids[:n], found, strict=True)
+    )

@@ -1,0 +1,216 @@
+"""Priors: what is known of the robot's place before any scan, as log-likelihoods of poses.
+
+A prior is a pure function of pose. Priors add up, and evidence can overrule them: outside, each
+costs `FLOOR` and no more. The mass of places that are not listed is not touched, so that a wrong
+prior cannot make a bad place look good.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.errors import InputError
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.se2 import SE2
+
+FLOOR = math.log(1e-2)
+"""Log-likelihood far outside a prior: a hundred to one."""
+
+
+class Prior(Protocol):
+    """A log-likelihood over poses."""
+
+    def log_likelihood(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return log-likelihoods, shape (n,), from `FLOOR` to 0 for each prior that is added.
+
+        Parameters
+        ----------
+        poses : ndarray, shape (n, 3)
+            x (m), y (m), yaw (rad) of the base in the map frame.
+        """
+
+    def check(self, grid: OccupancyGrid) -> None:
+        """Raise InputError if no robot of this map can be there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Near:
+    """Near a pose: 0 within the radius, then falling as a Gaussian does, down to the floor.
+
+    Parameters
+    ----------
+    pose : SE2
+        ``T_map_base``.
+    radius : float
+        Distance that is as likely as none, m, above 0.
+    angle : float
+        Heading error that is as likely as none, rad; the default leaves the heading open.
+
+    Raises
+    ------
+    InputError
+        If the radius or the angle is not above 0.
+    """
+
+    pose: SE2
+    radius: float
+    angle: float = math.pi
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.radius < math.inf and self.angle > 0.0):
+            raise InputError(
+                expected="a prior near a pose with a radius and an angle above 0",
+                received=f"radius {self.radius} m, angle {self.angle} rad",
+                remedy="give the distance by which the pose may be wrong, such as 1 m",
+            )
+
+    def log_likelihood(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return log-likelihoods of poses in the map frame, shape (n,)."""
+        away = np.hypot(poses[:, 0] - self.pose.x, poses[:, 1] - self.pose.y)
+        turned = np.abs(np.remainder(poses[:, 2] - self.pose.yaw + math.pi, 2 * math.pi) - math.pi)
+        return _falling(np.maximum(away / self.radius, turned / self.angle))
+
+    def check(self, grid: OccupancyGrid) -> None:
+        """Raise InputError if the pose is not on the map, or no free cell is within the radius."""
+        column, row = grid.to_cells(np.array([self.pose.x, self.pose.y])).tolist()
+        where = f"a pose at ({self.pose.x:.2f}, {self.pose.y:.2f})"
+        if not (0 <= column < grid.width and 0 <= row < grid.height):
+            raise InputError(
+                expected="a prior on the map",
+                received=f"{where}, which is outside",
+                remedy="give the pose in the map frame, in metres",
+            )
+        reach = self.radius / grid.resolution
+        rows = slice(max(0, int(row - reach)), int(row + reach) + 2)
+        columns = slice(max(0, int(column - reach)), int(column + reach) + 2)
+        y, x = np.nonzero(grid.seen_free[rows, columns])
+        off = np.hypot(y + rows.start + 0.5 - row, x + columns.start + 0.5 - column)
+        if not (off <= reach + 1.0).any():
+            raise InputError(
+                expected=f"free space within {self.radius} m of a prior",
+                received=f"{where} with none around it",
+                remedy="move the pose to where a robot can be, or enlarge the radius",
+            )
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Region:
+    """Inside a polygon: 0 inside, falling within half a metre outside, down to the floor.
+
+    Parameters
+    ----------
+    polygon : sequence of (x, y)
+        Corners in the map frame, m, in order; at least three. The last is joined to the first.
+
+    Raises
+    ------
+    InputError
+        If these are not three or more finite corners around an area.
+    """
+
+    polygon: Sequence[tuple[float, float]]
+    _corners: NDArray[np.float64] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        corners = np.array(self.polygon, np.float64)
+        if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:
+            received = f"{len(self.polygon)} of them"
+        elif not np.isfinite(corners).all():
+            received = "NaN or infinity among them"
+        elif abs(_area(corners)) < 1e-9:
+            received = "all on one line"
+        else:
+            corners.flags.writeable = False
+            object.__setattr__(self, "_corners", corners)
+            return
+        raise InputError(
+            expected="a region with at least three corners (x, y) around an area",
+            received=received,
+            remedy="list the corners in order, in metres in the map frame",
+        )
+
+    def log_likelihood(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return log-likelihoods of poses in the map frame, shape (n,)."""
+        points = poses[:, :2]
+        outside = ~_inside(points, self._corners)
+        away = np.where(outside, _distance(points, self._corners), 0.0)
+        return _falling(1.0 + away / _EDGE_M)
+
+    def check(self, grid: OccupancyGrid) -> None:
+        """Raise InputError if no free cell of the map is inside."""
+        rows, columns = np.nonzero(grid.seen_free)
+        centres = grid.to_map(np.column_stack([columns, rows]).astype(np.float64) + 0.5)
+        if not _inside(centres, self._corners).any():
+            raise InputError(
+                expected="a region with free space of the map inside",
+                received="one without",
+                remedy="check its corners: metres, in the map frame",
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class All:
+    """Several priors at once: their log-likelihoods are added.
+
+    Parameters
+    ----------
+    priors : tuple of Prior
+        In any order.
+    """
+
+    priors: tuple[Prior, ...]
+
+    def log_likelihood(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return log-likelihoods of poses in the map frame, shape (n,)."""
+        logs = np.zeros(len(poses))
+        for prior in self.priors:
+            logs += prior.log_likelihood(poses)
+        return logs
+
+    def check(self, grid: OccupancyGrid) -> None:
+        """Raise InputError if one of them does not fit the map."""
+        for prior in self.priors:
+            prior.check(grid)
+
+
+# The edge of a drawn region is meant to about this, m.
+_EDGE_M = 0.25
+
+
+def _falling(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return 0 up to a ratio of 1, then a Gaussian's fall with that width, down to the floor."""
+    log: NDArray[np.float64] = np.maximum(FLOOR, -2.0 * np.maximum(0.0, ratio - 1.0) ** 2)
+    return log
+
+
+def _area(corners: NDArray[np.float64]) -> float:
+    x, y = corners.T
+    return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def _inside(points: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Count how often a ray to the right crosses the edges: an odd number means inside."""
+    inside = np.zeros(len(points), np.bool_)
+    x, y = points.T
+    for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        if ay != by:
+            crosses = (ay > y) != (by > y)
+            inside ^= crosses & (x < ax + (y - ay) * (bx - ax) / (by - ay))
+    return inside
+
+
+def _distance(points: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance to the nearest edge, shape (n,), m."""
+    nearest = np.full(len(points), np.inf)
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        edge = b - a
+        length2 = max(float(edge @ edge), 1e-12)
+        along = np.clip((points - a) @ edge / length2, 0.0, 1.0)
+        nearest = np.minimum(nearest, np.hypot(*(points - a - along[:, None] * edge).T))
+    return nearest

@@ -1,0 +1,169 @@
+"""Places with their past: where each would have put the robot at every view of the window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.belief.adjust import adjust, penalty, slack_between
+from firstfix.belief.planar import between, compose
+from firstfix.belief.view import Observation, costs, settle_on_rays
+from firstfix.fields.map_fields import MapFields
+
+# Beams that weigh all places, and those that weigh the few best.
+BEAMS = 36
+CAREFUL_BEAMS = 180
+
+# The best places are refined on rays, below the size of a cell.
+RAY_PLACES = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Tracks:
+    """Places and their past.
+
+    Parameters
+    ----------
+    poses : ndarray, shape (n, v, 3)
+        x, y (cells), heading (rad) of the base in the grid at each view, oldest first.
+    costs : ndarray, shape (n, v)
+        Mean cost of a beam at each view, nats, with what its adjustment costs.
+    careful : ndarray of bool, shape (n, v)
+        True where all beams have been compared.
+    ids : ndarray of int64, shape (n,)
+        Names that last.
+    """
+
+    poses: NDArray[np.float64]
+    costs: NDArray[np.float64]
+    careful: NDArray[np.bool_]
+    ids: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @classmethod
+    def none(cls, views: int) -> Tracks:
+        """Make no tracks over some views."""
+        return cls(
+            np.empty((0, views, 3)),
+            np.empty((0, views)),
+            np.empty((0, views), np.bool_),
+            np.empty(0, np.int64),
+        )
+
+    @classmethod
+    def at(
+        cls, poses: NDArray[np.float64], cost: NDArray[np.float64], ids: NDArray[np.int64]
+    ) -> Tracks:
+        """Make tracks of one view: poses of shape (n, 3), costs and ids of shape (n,)."""
+        return cls(poses[:, None], cost[:, None], np.zeros((len(ids), 1), np.bool_), ids)
+
+    @property
+    def now(self) -> NDArray[np.float64]:
+        """Poses at the newest view, shape (n, 3)."""
+        return self.poses[:, -1]
+
+    def take(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Tracks:
+        """Choose some of the tracks."""
+        return Tracks(self.poses[index], self.costs[index], self.careful[index], self.ids[index])
+
+    def split(self, n: int) -> tuple[Tracks, Tracks]:
+        """Return the first n tracks, and the others."""
+        index = np.arange(len(self))
+        return self.take(index[:n]), self.take(index[n:])
+
+    def named(self, ids: NDArray[np.int64]) -> Tracks:
+        """Give the tracks other ids, shape (n,)."""
+        return replace(self, ids=ids)
+
+    def joined_by(self, others: Tracks) -> Tracks:
+        """Put tracks over the same views together."""
+        return Tracks(
+            np.concatenate([self.poses, others.poses]),
+            np.concatenate([self.costs, others.costs]),
+            np.concatenate([self.careful, others.careful]),
+            np.concatenate([self.ids, others.ids]),
+        )
+
+    def over(self, views: slice) -> Tracks:
+        """Keep some of the views."""
+        return Tracks(self.poses[:, views], self.costs[:, views], self.careful[:, views], self.ids)
+
+    def followed_by(self, poses: NDArray[np.float64], cost: NDArray[np.float64]) -> Tracks:
+        """Add a view after all others: poses of shape (n, 3), costs of shape (n,)."""
+        return self.before(Tracks.at(poses, cost, self.ids))
+
+    def preceded_by(self, poses: NDArray[np.float64], cost: NDArray[np.float64]) -> Tracks:
+        """Add a view before all others: poses of shape (n, 3), costs of shape (n,)."""
+        return Tracks.at(poses, cost, self.ids).before(self)
+
+    def before(self, later: Tracks) -> Tracks:
+        """Put the same places over later views behind these."""
+        return Tracks(
+            np.concatenate([self.poses, later.poses], axis=1),
+            np.concatenate([self.costs, later.costs], axis=1),
+            np.concatenate([self.careful, later.careful], axis=1),
+            self.ids,
+        )
+
+
+def follow(tracks: Tracks, start: Observation, end: Observation, fields: MapFields) -> Tracks:
+    """Carry tracks from the newest view to the next, and adjust them to it."""
+    poses, cost = _carried(tracks.now, start, end, fields)
+    return tracks.followed_by(poses, cost)
+
+
+def at_rest(tracks: Tracks, seen: Observation, fields: MapFields) -> Tracks:
+    """Weigh tracks anew by the newest view, which has changed while the robot stood still."""
+    earlier = tracks.over(slice(None, -1))
+    return earlier.followed_by(tracks.now, costs(tracks.now, seen, BEAMS, fields))
+
+
+def trace_back(tracks: Tracks, early: Observation, late: Observation, fields: MapFields) -> Tracks:
+    """Carry tracks, whose oldest view is the late one, back to an early one."""
+    poses, cost = _carried(tracks.poses[:, 0], late, early, fields)
+    return tracks.preceded_by(poses, cost)
+
+
+def look_again(tracks: Tracks, window: Sequence[Observation], fields: MapFields) -> Tracks:
+    """Compare all beams where only some have been, and refine the newest poses on rays."""
+    careful = _compare_all(tracks, window, fields)
+    seen, last = window[-1], len(window) - 1
+    few = careful.take(np.arange(min(RAY_PLACES, len(careful))))
+    sharp = settle_on_rays(few.now, seen, fields)
+    gain = costs(few.now, seen, CAREFUL_BEAMS, fields) - costs(sharp, seen, CAREFUL_BEAMS, fields)
+    # Rays are sharper, but in a map with smeared walls they can do harm: the better pose stays.
+    better = np.flatnonzero(gain > 0.0)
+    poses, cost = careful.poses.copy(), careful.costs.copy()
+    poses[better, last] = sharp[better]
+    cost[better, last] -= gain[better]
+    return replace(careful, poses=poses, costs=cost)
+
+
+def _compare_all(tracks: Tracks, window: Sequence[Observation], fields: MapFields) -> Tracks:
+    refined, careful = tracks.costs.copy(), tracks.careful.copy()
+    for v, seen in enumerate(window):
+        rough = np.flatnonzero(~careful[:, v])
+        if len(rough) > 0:
+            poses = tracks.poses[rough, v]
+            fewer, everything = (costs(poses, seen, n, fields) for n in (BEAMS, CAREFUL_BEAMS))
+            refined[rough, v] += everything - fewer  # what the adjustment costs stays
+            careful[rough, v] = True
+    return replace(tracks, costs=refined, careful=careful)
+
+
+def _carried(
+    poses: NDArray[np.float64], start: Observation, end: Observation, fields: MapFields
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return poses at the end, by odometry or adjusted, whichever is cheaper, and their costs."""
+    predicted = compose(poses, between(start.odometry, end.odometry))
+    slack = slack_between(start, end)
+    adjusted = adjust(predicted, end, slack, fields)
+    plain = costs(predicted, end, BEAMS, fields)
+    bent = costs(adjusted, end, BEAMS, fields) + penalty(predicted, adjusted, slack)
+    better = bent < plain
+    return np.where(better[:, None], adjusted, predicted), np.where(better, bent, plain)
