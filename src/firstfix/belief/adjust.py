@@ -30,10 +30,6 @@ _FIRST_SIGMA_M, _LAST_SIGMA_M = 0.2, 0.08
 # Wheels slip now and then: the tails of Student's t with three degrees of freedom.
 _FREEDOM = 3.0
 
-# A penalty of one nat in units of the mean cost of a beam: the slope of the power law (exponent 12)
-# at a usual cost.
-_COST_PER_NAT = 0.06
-
 
 @dataclass(frozen=True, slots=True)
 class Slack:
@@ -101,15 +97,14 @@ def adjust(
     return compose(poses, inverse(sensor.T_base_laser))
 
 
-def penalty(
+def strains(
     predicted: NDArray[np.float64], adjusted: NDArray[np.float64], slack: Slack
 ) -> NDArray[np.float64]:
-    """Return what adjustments cost, shape (n,), in units of the mean cost of a beam."""
+    """Return how unlikely odometry makes adjustments, shape (n,): minus log-likelihoods, nats."""
     moved = ((adjusted - predicted)[:, :2] / slack.cells) ** 2
     turned = (wrap(adjusted[:, 2] - predicted[:, 2]) / slack.rad) ** 2
-    squared = moved.sum(axis=1) + turned
-    nats: NDArray[np.float64] = 0.5 * _FREEDOM * np.log1p(squared / _FREEDOM)
-    return _COST_PER_NAT * nats
+    squared: NDArray[np.float64] = moved.sum(axis=1) + turned
+    return 0.5 * (_FREEDOM + 1.0) * np.log1p(squared / _FREEDOM)
 
 
 @njit(cache=True, nogil=True)

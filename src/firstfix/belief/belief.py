@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from firstfix.belief.config import BeliefConfig
 from firstfix.belief.enter import propose
 from firstfix.belief.evidence import (
+    ODOMETRY_WEIGHT,
     WRONG_MAP_COST,
     exponent,
     log_likelihoods,
@@ -21,12 +22,12 @@ from firstfix.belief.evidence import (
 from firstfix.belief.hints import Hint, hint_logs
 from firstfix.belief.judge import Judgement, Rule, judge
 from firstfix.belief.merge import merge
-from firstfix.belief.place import Place, listed_places
+from firstfix.belief.place import listed_places
 from firstfix.belief.planar import between, compose, in_cells, to_map
 from firstfix.belief.prior import Prior
 from firstfix.belief.tracks import Tracks, at_rest, follow, look_again, trace_back
 from firstfix.belief.view import Observation, View
-from firstfix.core.estimate import SearchReport, Verdict
+from firstfix.core.estimate import Hypothesis, SearchReport, Verdict
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS
@@ -115,7 +116,7 @@ class Belief:
         return to_map(self._carried(self.tracks.now), self.fields.grid)
 
     @cached_property
-    def places(self) -> tuple[Place, ...]:
+    def places(self) -> tuple[Hypothesis, ...]:
         """The places worth listing, most likely first, with covariance and evidence."""
         if not self.window:
             return ()
@@ -157,7 +158,7 @@ def begin(
         config=config or BeliefConfig(),
         hints=(),
         window=(),
-        tracks=Tracks.none(0),
+        tracks=Tracks.none(),
         probabilities=np.empty(0),
         elsewhere=1.0,
         odometry=SE2.identity(),
@@ -295,7 +296,7 @@ def _followed(belief: Belief, view: View) -> tuple[tuple[Observation, ...], Trac
     fields, window, tracks = belief.fields, belief.window, belief.tracks
     seen = Observation((view,), fields.grid.resolution)
     if not window:
-        return (seen,), Tracks.none(1)
+        return (seen,), Tracks.none()
     if _rests(window[-1], view):
         joined = window[-1].joined_by(view)
         return (*window[:-1], joined), at_rest(tracks, joined, fields)
@@ -303,7 +304,7 @@ def _followed(belief: Belief, view: View) -> tuple[tuple[Observation, ...], Trac
     first = max(0, len(window) - kept)
     window, tracks = window[first:], tracks.over(slice(first, None))
     if not window:
-        return (seen,), Tracks.none(1)
+        return (seen,), Tracks.none()
     return (*window, seen), follow(tracks, window[-1], seen, fields)
 
 
@@ -328,12 +329,17 @@ def _ranked(
     """Merge tracks to places, most likely first, and return their log-likelihoods."""
     grid = belief.fields.grid
     logs = _joint(tracks, window) + hint_logs(tracks.now, window[-1], belief.hints, grid)
-    kept, names = merge(tracks.now, logs, tracks.ids, grid.resolution, belief.config.places)
+    favourite = belief.judgement.favourite
+    known = (favourite.id if favourite is not None else -1, belief.next_id)
+    most = belief.config.places
+    kept, names = merge(tracks.now, logs, tracks.ids, known, grid.resolution, most)
     return tracks.take(kept).named(names), logs[kept]
 
 
 def _joint(tracks: Tracks, window: tuple[Observation, ...]) -> NDArray[np.float64]:
-    return log_likelihoods(tracks.costs.mean(axis=1), _power(window))
+    by_views = log_likelihoods(tracks.costs.mean(axis=1), _power(window))
+    by_odometry: NDArray[np.float64] = -ODOMETRY_WEIGHT * tracks.strains.sum(axis=1)
+    return by_views + by_odometry
 
 
 def _power(window: tuple[Observation, ...]) -> float:

@@ -16,7 +16,6 @@ class BeliefConfig:
     shortlist: int = setting(150, "places of each later search that enter", 1, 100_000)
     places: int = setting(600, "places held at most; the rest counts as elsewhere", 2, 100_000)
     sure_probability: float = setting(0.98, "least probability of a place that is sure", 0.5, 1.0)
-    budget_s: float = setting(30.0, "wall time of one search, s", 0.0)
 
     def __post_init__(self) -> None:
         check_settings(self)

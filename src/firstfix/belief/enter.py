@@ -14,7 +14,11 @@ from firstfix.belief.tracks import BEAMS, Tracks
 from firstfix.belief.view import Observation, costs, settle
 from firstfix.core.estimate import SearchReport
 from firstfix.fields.map_fields import MapFields
+from firstfix.fields.range_table import DIRECTIONS
+from firstfix.fields.search_grid import MAX_POSITIONS
 from firstfix.global_localization.search import search
+
+_ALL_POSES = MAX_POSITIONS * DIRECTIONS
 
 # With a hint, the search is asked for more places, so that some are near it.
 _DEEPER = 20
@@ -55,7 +59,7 @@ def propose(
     sensor = seen.sensors[0]
     most = config.first_shortlist if len(window) == 1 else config.shortlist
     depth = most * _DEEPER if hints else most
-    candidates, report = search(sensor.beams, fields, depth, config.budget_s)
+    candidates, report = search(sensor.beams, fields, depth, _ALL_POSES)
     poses = compose(candidates.poses, inverse(sensor.T_base_laser))
     if hints:
         poses = poses[_best_and_hinted(poses, most, seen, hints, fields)]

@@ -12,16 +12,17 @@ from numpy.typing import NDArray
 from firstfix.belief.evidence import exponent, log_likelihoods, shares
 from firstfix.belief.view import Observation, motion
 from firstfix.core.estimate import Verdict
+from firstfix.global_localization.verdict import RIVAL_SHARE
 
 # Mean cost of a beam up to which a view is explained at a place. The wrong map begins at 2.3.
 EXPLAINED_COST = 1.6
 
+# A place that was published stays so while it is more likely than all others together.
+STAYING_PROBABILITY = 0.5
+
 # A second decision counts from a view that was taken this far away, or turned by this much.
 SECOND_LOOK_M = 0.3
 SECOND_LOOK_RAD = math.radians(15.0)
-
-# A place with this share of the best one's probability is a rival.
-_RIVAL_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -116,17 +117,17 @@ def judge(
         The verdict and its reason.
     """
     seen = window[-1]
-    elsewhere = 1.0 - float(probabilities.sum())
-    if len(ids) == 0 or elsewhere > 0.5:
+    if len(ids) == 0 or probabilities.sum() < 0.5:
         return Judgement(Verdict.NO_MATCH, _nowhere(len(window)), None, unexplained=True)
-    unexplained = bool(costs[0, -1] > EXPLAINED_COST)
-    if unexplained:
+    known = before if before is not None and before.id == ids[0] else None
+    stays = known is not None and known.published and probabilities[0] >= STAYING_PROBABILITY
+    if costs[0, -1] > EXPLAINED_COST:
         reason = "the most likely place does not explain the latest view"
-        return Judgement(Verdict.AMBIGUOUS, reason, None, unexplained=True)
-    if probabilities[0] < rule.probability:
+        kept = known if stays else None
+        return Judgement(Verdict.AMBIGUOUS, reason, kept, unexplained=True)
+    if not stays and probabilities[0] < rule.probability:
         return Judgement(Verdict.AMBIGUOUS, _undecided(probabilities, len(window)), None)
 
-    known = before if before is not None and before.id == ids[0] else None
     alone = seen.decides_alone and _alone(costs[:, -1], len(seen.beams)) >= rule.probability
     published = alone or rule.hinted or (known is not None and _confirmed(known, seen))
     since = seen if known is None else known.since
@@ -160,7 +161,7 @@ def _sure(views: int, rule: Rule) -> str:
 
 
 def _undecided(probabilities: NDArray[np.float64], views: int) -> str:
-    rivals = int(np.count_nonzero(probabilities >= _RIVAL_SHARE * probabilities[0]))
+    rivals = int(np.count_nonzero(probabilities >= RIVAL_SHARE * probabilities[0]))
     which = "the view" if views == 1 else f"the latest {views} views"
     if rivals > 1:
         return f"{rivals} places explain {which} about as well; motion may tell them apart"

@@ -1,4 +1,4 @@
-"""Which poses are one place: the best of each stays and keeps the oldest name."""
+"""Which poses are one place: the best of each stays, under the name that the place had."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.core.angles import FULL_TURN
-from firstfix.global_localization.places import SEPARATION_M, SEPARATION_RAD
+from firstfix.global_localization.places import SAME_PLACE_M, SAME_PLACE_RAD
 
 
 def merge(
     poses: NDArray[np.float64],
     log_weights: NDArray[np.float64],
     ids: NDArray[np.int64],
+    known: tuple[int, int],
     resolution: float,
     most: int,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -26,7 +27,9 @@ def merge(
     log_weights : ndarray, shape (n,)
         Higher is better; of equal ones the earlier.
     ids : ndarray of int64, shape (n,)
-        Names; smaller is older.
+        Names.
+    known : tuple of int
+        The favourite's id, or -1; and the first id that is new.
     resolution : float
         Side of a cell, m.
     most : int
@@ -37,10 +40,11 @@ def merge(
     kept : ndarray of int64, shape (m,)
         Indices of the chosen poses.
     names : ndarray of int64, shape (m,)
-        The oldest id among the poses of each place.
+        For each place the favourite's id if it is among its poses; else that of the best pose whose
+        id is not new; else that of the best pose.
     """
     order = np.argsort(-log_weights, kind="stable")
-    return _merge(poses, order, ids, SEPARATION_M / resolution, SEPARATION_RAD, most)
+    return _merge(poses, order, ids, known, SAME_PLACE_M / resolution, SAME_PLACE_RAD, most)
 
 
 @njit(cache=True, nogil=True)
@@ -48,6 +52,7 @@ def _merge(
     poses: NDArray[np.float64],
     order: NDArray[np.int64],
     ids: NDArray[np.int64],
+    known: tuple[int, int],
     near_cells: float,
     near_rad: float,
     most: int,
@@ -55,6 +60,7 @@ def _merge(
     kept = np.empty(min(most, order.shape[0]), np.int64)
     names = np.empty_like(kept)
     n = 0
+    favourite, first_new = known
     for i in order:
         taken = False
         for j in range(n):
@@ -62,7 +68,8 @@ def _merge(
             if min(turn, FULL_TURN - turn) <= near_rad:
                 dx, dy = poses[i, 0] - poses[kept[j], 0], poses[i, 1] - poses[kept[j], 1]
                 if dx * dx + dy * dy <= near_cells * near_cells:
-                    names[j] = min(names[j], ids[i])
+                    if ids[i] == favourite or names[j] >= first_new > ids[i]:
+                        names[j] = ids[i]
                     taken = True
                     break
         if not taken and n < kept.shape[0]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,29 +13,12 @@ from firstfix.belief.view import Observation
 from firstfix.core.estimate import Hypothesis
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
-from firstfix.global_localization.answer import verified_place
 from firstfix.global_localization.refine import refine_on_rays
-from firstfix.global_localization.verify import verify
+from firstfix.global_localization.verify import verified_place, verify
 
 _MOST_LISTED = 24
 _LEAST_LISTED = 2
 _LISTED_SHARE = 1e-3
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Place:
-    """A place where the robot may be.
-
-    Parameters
-    ----------
-    id : int
-        The same from view to view, as long as the place is held.
-    hypothesis : Hypothesis
-        ``T_map_base``, its covariance, probability, and how the latest view agrees.
-    """
-
-    id: int
-    hypothesis: Hypothesis
 
 
 def listed_places(
@@ -44,7 +27,7 @@ def listed_places(
     seen: Observation,
     step: SE2,
     fields: MapFields,
-) -> tuple[Place, ...]:
+) -> tuple[Hypothesis, ...]:
     """Describe the likeliest places, at most 24.
 
     Parameters
@@ -62,8 +45,8 @@ def listed_places(
 
     Returns
     -------
-    tuple of Place
-        Those with a share of a thousandth, and at least two if there are two.
+    tuple of Hypothesis
+        Those with a share of a thousandth, and at least two if there are two; with their ids.
     """
     worth = int(np.count_nonzero(probabilities >= _LISTED_SHARE))
     n = min(len(tracks), _MOST_LISTED, max(_LEAST_LISTED, worth))
@@ -80,6 +63,6 @@ def listed_places(
         for i in range(n)
     ]
     return tuple(
-        Place(int(name), replace(hypothesis, pose=hypothesis.pose @ step))
+        replace(hypothesis, pose=hypothesis.pose @ step, id=int(name))
         for name, hypothesis in zip(tracks.ids[:n], found, strict=True)
     )

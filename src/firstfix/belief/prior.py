@@ -19,8 +19,8 @@ from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 
-FLOOR = math.log(1e-2)
-"""Log-likelihood far outside a prior: a hundred to one."""
+FLOOR = math.log(1e-3)
+"""Log-likelihood far outside a prior: a thousand to one."""
 
 
 class Prior(Protocol):

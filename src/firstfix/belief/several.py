@@ -68,7 +68,7 @@ def as_result(belief: Belief, elapsed_s: float) -> LocateResult:
     return LocateResult(
         verdict=belief.verdict,
         reason=belief.reason,
-        hypotheses=tuple(place.hypothesis for place in belief.places),
+        hypotheses=belief.places,
         search=belief.search,
         elapsed_s=elapsed_s,
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.belief.adjust import adjust, penalty, slack_between
+from firstfix.belief.adjust import adjust, slack_between, strains
 from firstfix.belief.planar import between, compose
 from firstfix.belief.view import Observation, costs, settle_on_rays
 from firstfix.fields.map_fields import MapFields
@@ -16,6 +16,10 @@ from firstfix.fields.map_fields import MapFields
 # Beams that weigh all places, and those that weigh the few best.
 BEAMS = 36
 CAREFUL_BEAMS = 180
+
+# A nat of odometry in units of the mean cost of a beam: the slope of the power law (exponent 12) at
+# a usual cost.
+_COST_PER_NAT = 0.06
 
 # The best places are refined on rays, below the size of a cell.
 RAY_PLACES = 12
@@ -30,7 +34,9 @@ class Tracks:
     poses : ndarray, shape (n, v, 3)
         x, y (cells), heading (rad) of the base in the grid at each view, oldest first.
     costs : ndarray, shape (n, v)
-        Mean cost of a beam at each view, nats, with what its adjustment costs.
+        Mean cost of a beam at each view, nats.
+    strains : ndarray, shape (n, v)
+        How far each pose is from what odometry says of it: minus a log-likelihood, nats.
     careful : ndarray of bool, shape (n, v)
         True where all beams have been compared.
     ids : ndarray of int64, shape (n,)
@@ -39,6 +45,7 @@ class Tracks:
 
     poses: NDArray[np.float64]
     costs: NDArray[np.float64]
+    strains: NDArray[np.float64]
     careful: NDArray[np.bool_]
     ids: NDArray[np.int64]
 
@@ -46,21 +53,22 @@ class Tracks:
         return len(self.ids)
 
     @classmethod
-    def none(cls, views: int) -> Tracks:
-        """Make no tracks over some views."""
-        return cls(
-            np.empty((0, views, 3)),
-            np.empty((0, views)),
-            np.empty((0, views), np.bool_),
-            np.empty(0, np.int64),
-        )
+    def at(
+        cls,
+        poses: NDArray[np.float64],
+        cost: NDArray[np.float64],
+        ids: NDArray[np.int64],
+        strain: NDArray[np.float64] | None = None,
+    ) -> Tracks:
+        """Make tracks of one view: poses of shape (n, 3), all others of shape (n,)."""
+        strain = np.zeros(len(ids)) if strain is None else strain
+        rough = np.zeros((len(ids), 1), np.bool_)
+        return cls(poses[:, None], cost[:, None], strain[:, None], rough, ids)
 
     @classmethod
-    def at(
-        cls, poses: NDArray[np.float64], cost: NDArray[np.float64], ids: NDArray[np.int64]
-    ) -> Tracks:
-        """Make tracks of one view: poses of shape (n, 3), costs and ids of shape (n,)."""
-        return cls(poses[:, None], cost[:, None], np.zeros((len(ids), 1), np.bool_), ids)
+    def none(cls) -> Tracks:
+        """Make no tracks, over one view."""
+        return cls.at(np.empty((0, 3)), np.empty(0), np.empty(0, np.int64))
 
     @property
     def now(self) -> NDArray[np.float64]:
@@ -69,7 +77,13 @@ class Tracks:
 
     def take(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Tracks:
         """Choose some of the tracks."""
-        return Tracks(self.poses[index], self.costs[index], self.careful[index], self.ids[index])
+        return Tracks(
+            self.poses[index],
+            self.costs[index],
+            self.strains[index],
+            self.careful[index],
+            self.ids[index],
+        )
 
     def split(self, n: int) -> tuple[Tracks, Tracks]:
         """Return the first n tracks, and the others."""
@@ -82,51 +96,38 @@ class Tracks:
 
     def joined_by(self, others: Tracks) -> Tracks:
         """Put tracks over the same views together."""
-        return Tracks(
-            np.concatenate([self.poses, others.poses]),
-            np.concatenate([self.costs, others.costs]),
-            np.concatenate([self.careful, others.careful]),
-            np.concatenate([self.ids, others.ids]),
-        )
-
-    def over(self, views: slice) -> Tracks:
-        """Keep some of the views."""
-        return Tracks(self.poses[:, views], self.costs[:, views], self.careful[:, views], self.ids)
-
-    def followed_by(self, poses: NDArray[np.float64], cost: NDArray[np.float64]) -> Tracks:
-        """Add a view after all others: poses of shape (n, 3), costs of shape (n,)."""
-        return self.before(Tracks.at(poses, cost, self.ids))
-
-    def preceded_by(self, poses: NDArray[np.float64], cost: NDArray[np.float64]) -> Tracks:
-        """Add a view before all others: poses of shape (n, 3), costs of shape (n,)."""
-        return Tracks.at(poses, cost, self.ids).before(self)
+        return _joined(self, others, 0, np.concatenate([self.ids, others.ids]))
 
     def before(self, later: Tracks) -> Tracks:
         """Put the same places over later views behind these."""
+        return _joined(self, later, 1, self.ids)
+
+    def over(self, views: slice) -> Tracks:
+        """Keep some of the views."""
         return Tracks(
-            np.concatenate([self.poses, later.poses], axis=1),
-            np.concatenate([self.costs, later.costs], axis=1),
-            np.concatenate([self.careful, later.careful], axis=1),
+            self.poses[:, views],
+            self.costs[:, views],
+            self.strains[:, views],
+            self.careful[:, views],
             self.ids,
         )
 
 
 def follow(tracks: Tracks, start: Observation, end: Observation, fields: MapFields) -> Tracks:
     """Carry tracks from the newest view to the next, and adjust them to it."""
-    poses, cost = _carried(tracks.now, start, end, fields)
-    return tracks.followed_by(poses, cost)
-
-
-def at_rest(tracks: Tracks, seen: Observation, fields: MapFields) -> Tracks:
-    """Weigh tracks anew by the newest view, which has changed while the robot stood still."""
-    earlier = tracks.over(slice(None, -1))
-    return earlier.followed_by(tracks.now, costs(tracks.now, seen, BEAMS, fields))
+    return tracks.before(_carried(tracks.now, tracks.ids, start, end, fields))
 
 
 def trace_back(tracks: Tracks, early: Observation, late: Observation, fields: MapFields) -> Tracks:
     """Carry tracks, whose oldest view is the late one, back to an early one."""
-    poses, cost = _carried(tracks.poses[:, 0], late, early, fields)
-    return tracks.preceded_by(poses, cost)
+    return _carried(tracks.poses[:, 0], tracks.ids, late, early, fields).before(tracks)
+
+
+def at_rest(tracks: Tracks, seen: Observation, fields: MapFields) -> Tracks:
+    """Weigh tracks anew by the newest view, which has changed while the robot stood still."""
+    earlier, newest = tracks.over(slice(None, -1)), tracks.over(slice(-1, None))
+    cost = costs(tracks.now, seen, BEAMS, fields)
+    return earlier.before(Tracks.at(tracks.now, cost, tracks.ids, newest.strains[:, 0]))
 
 
 def look_again(tracks: Tracks, window: Sequence[Observation], fields: MapFields) -> Tracks:
@@ -151,19 +152,38 @@ def _compare_all(tracks: Tracks, window: Sequence[Observation], fields: MapField
         if len(rough) > 0:
             poses = tracks.poses[rough, v]
             fewer, everything = (costs(poses, seen, n, fields) for n in (BEAMS, CAREFUL_BEAMS))
-            refined[rough, v] += everything - fewer  # what the adjustment costs stays
+            refined[rough, v] += everything - fewer
             careful[rough, v] = True
     return replace(tracks, costs=refined, careful=careful)
 
 
 def _carried(
-    poses: NDArray[np.float64], start: Observation, end: Observation, fields: MapFields
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return poses at the end, by odometry or adjusted, whichever is cheaper, and their costs."""
+    poses: NDArray[np.float64],
+    ids: NDArray[np.int64],
+    start: Observation,
+    end: Observation,
+    fields: MapFields,
+) -> Tracks:
+    """Return the tracks at the end only: by odometry, or adjusted where that fits better."""
     predicted = compose(poses, between(start.odometry, end.odometry))
     slack = slack_between(start, end)
     adjusted = adjust(predicted, end, slack, fields)
-    plain = costs(predicted, end, BEAMS, fields)
-    bent = costs(adjusted, end, BEAMS, fields) + penalty(predicted, adjusted, slack)
-    better = bent < plain
-    return np.where(better[:, None], adjusted, predicted), np.where(better, bent, plain)
+    plain, bent = (costs(way, end, BEAMS, fields) for way in (predicted, adjusted))
+    strain = strains(predicted, adjusted, slack)
+    better = bent + _COST_PER_NAT * strain < plain
+    return Tracks.at(
+        np.where(better[:, None], adjusted, predicted),
+        np.where(better, bent, plain),
+        ids,
+        np.where(better, strain, 0.0),
+    )
+
+
+def _joined(one: Tracks, other: Tracks, axis: int, ids: NDArray[np.int64]) -> Tracks:
+    return Tracks(
+        np.concatenate([one.poses, other.poses], axis=axis),
+        np.concatenate([one.costs, other.costs], axis=axis),
+        np.concatenate([one.strains, other.strains], axis=axis),
+        np.concatenate([one.careful, other.careful], axis=axis),
+        ids,
+    )

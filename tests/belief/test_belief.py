@@ -1,0 +1,245 @@
+"""Several views, one belief: laws, the slow twin, and what must never be said."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from firstfix.belief.belief import begin, brings_news, predict, update
+from firstfix.belief.config import BeliefConfig
+from firstfix.belief.prior import Near
+from firstfix.belief.view import View
+from firstfix.core.angles import angle_error
+from firstfix.core.estimate import Verdict
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import MapFields
+from firstfix.lab.simulation.lidar import Lidar
+
+WIDE = Lidar(beams=180, sigma_m=0.01)
+START = SE2(10.5, 2.0, 1.8)
+TURN = [SE2(0.3, 0.0, -0.35)] * 10
+
+
+def told(views, fields, **options):
+    belief = begin(fields, **options)
+    beliefs = []
+    for view in views:
+        belief = update(belief, view)
+        beliefs.append(belief)
+    return beliefs
+
+
+def is_at(pose, truth, most_m=0.1, most_deg=2.0):
+    near = pose.distance_to(truth) <= most_m
+    return near and angle_error(pose.yaw, truth.yaw) <= math.radians(most_deg)
+
+
+def end_of(start, steps):
+    for step in steps:
+        start = start @ step
+    return start
+
+
+# --- the right place, and when it may be said ---
+
+
+def test_views_decide_together_what_one_view_leaves_open(halls, drive):
+    beliefs = told(drive(halls.grid, START, TURN), halls)
+    assert beliefs[0].verdict is Verdict.AMBIGUOUS
+    assert beliefs[-1].verdict is Verdict.UNIQUE
+    assert is_at(beliefs[-1].places[0].pose, end_of(START, TURN))
+
+
+def test_one_scan_of_a_narrow_sensor_never_decides(halls, drive):
+    for yaw in np.linspace(-math.pi, math.pi, 12):
+        (view,) = drive(halls.grid, SE2(11.0, 2.0, float(yaw)), [])
+        assert update(begin(halls), view).verdict is not Verdict.UNIQUE
+
+
+def test_one_scan_of_a_sensor_that_sees_much_may_decide(room, drive):
+    truth = SE2(5.0, 2.5, 0.4)
+    (view,) = drive(room.grid, truth, [], WIDE)
+    belief = update(begin(room), view)
+    assert belief.verdict is Verdict.UNIQUE
+    assert is_at(belief.places[0].pose, truth)
+
+
+def test_what_is_identical_stays_open(four_rooms, drive):
+    start = SE2(*four_rooms.grid.to_map(np.array([60.0, 60.0])).tolist(), 0.5)
+    for belief in told(drive(four_rooms.grid, start, [SE2(0.0, 0.0, 0.5)] * 8), four_rooms):
+        assert belief.verdict is not Verdict.UNIQUE
+        assert belief.probabilities[0] < 0.6
+
+
+def test_a_published_place_stays_published_at_rest(halls, drive):
+    views = drive(halls.grid, START, [*TURN, SE2(0.0, 0.0, 0.0), SE2(0.0, 0.0, 0.0)])
+    last = told(views, halls)[-3:]
+    assert [belief.verdict for belief in last] == [Verdict.UNIQUE] * 3
+    assert len({belief.places[0].id for belief in last}) == 1
+
+
+def test_a_wrong_map_is_never_published(halls, room, drive):
+    beliefs = told(drive(halls.grid, START, TURN, WIDE), room)
+    assert all(belief.verdict is not Verdict.UNIQUE for belief in beliefs)
+
+
+# --- laws ---
+
+
+def test_mass_sums_to_one(halls, drive):
+    for belief in told(drive(halls.grid, START, TURN), halls):
+        assert belief.probabilities.sum() + belief.elsewhere == pytest.approx(1.0)
+        assert (np.diff(belief.probabilities) <= 0.0).all()
+
+
+def test_the_same_views_give_the_same_belief(halls, drive):
+    one, other = (told(drive(halls.grid, START, TURN[:4]), halls)[-1] for _ in range(2))
+    np.testing.assert_array_equal(one.poses, other.poses)
+    np.testing.assert_array_equal(one.probabilities, other.probabilities)
+    assert one.reason == other.reason
+
+
+def test_nothing_changes_a_belief(halls, drive):
+    views = drive(halls.grid, START, TURN[:3])
+    belief = update(begin(halls), views[0])
+    before = belief.poses.copy(), belief.probabilities.copy()
+    update(update(predict(belief, SE2(9.0, 9.0, 1.0)), views[1]), views[2])
+    np.testing.assert_array_equal(belief.poses, before[0])
+    np.testing.assert_array_equal(belief.probabilities, before[1])
+
+
+def test_the_frame_of_the_odometry_does_not_matter(halls, drive):
+    steps = TURN[:4]
+    one = told(drive(halls.grid, START, steps), halls)[-1]
+    other = told(drive(halls.grid, START, steps, odometry=SE2(30.0, -7.0, -2.0)), halls)[-1]
+    np.testing.assert_allclose(one.poses, other.poses, atol=1e-6)
+    np.testing.assert_allclose(one.probabilities, other.probabilities, atol=1e-6)
+
+
+def test_map_and_places_move_together(halls, drive):
+    move = SE2(-20.0, 5.0, 0.8)
+    grid = halls.grid
+    moved = OccupancyGrid(grid.cells, grid.resolution, move @ grid.T_map_grid)
+    views = drive(grid, START, TURN[:4])
+    here, there = told(views, halls)[-1], told(views, MapFields(moved))[-1]
+    np.testing.assert_allclose(here.probabilities, there.probabilities, atol=1e-9)
+    for a, b in zip(here.places, there.places, strict=True):
+        assert (move @ a.pose).distance_to(b.pose) < 1e-6
+
+
+def test_two_sensors_in_any_order_are_one_view(halls, drive):
+    back = Lidar(
+        beams=61,
+        fov=math.radians(60.0),
+        range_max=5.0,
+        sigma_m=0.01,
+        T_base_laser=SE2(-0.2, 0.0, math.pi),
+    )
+    pairs = list(
+        zip(drive(halls.grid, START, TURN), drive(halls.grid, START, TURN, back), strict=True)
+    )
+    one = told([View((*a.scans, *b.scans), a.T_odom_base) for a, b in pairs], halls)[-1]
+    other = told([View((*b.scans, *a.scans), a.T_odom_base) for a, b in pairs], halls)[-1]
+    assert one.verdict is Verdict.UNIQUE
+    np.testing.assert_allclose(one.probabilities, other.probabilities, atol=1e-9)
+
+
+# --- motion ---
+
+
+def test_prediction_moves_every_place(halls, drive):
+    (view,) = drive(halls.grid, START, [])
+    belief = update(begin(halls), view)
+    step = SE2(0.4, 0.1, 0.3)
+    moved = predict(belief, view.T_odom_base @ step)
+    for before, after in zip(belief.places, moved.places, strict=True):
+        assert is_at(after.pose, before.pose @ step, 1e-9, 1e-6)
+    for before, after in zip(belief.poses, moved.poses, strict=True):
+        assert is_at(SE2.from_array(after), SE2.from_array(before) @ step, 1e-9, 1e-6)
+
+
+def test_odometry_that_slips_a_tenth_keeps_the_place(halls, drive):
+    steps = [SE2(0.3, 0.0, -0.35)] * 10
+    belief = told(drive(halls.grid, START, steps, slip=0.9), halls)[-1]
+    assert belief.verdict is Verdict.UNIQUE
+    assert is_at(belief.places[0].pose, end_of(START, steps))
+
+
+def test_ids_last_while_the_robot_moves(halls, drive):
+    beliefs = told(drive(halls.grid, START, TURN), halls)
+    final = beliefs[-1].places[0].id
+    assert sum(final in belief.tracks.ids for belief in beliefs) >= len(beliefs) - 2
+
+
+def test_a_robot_that_is_carried_away_is_found_again(halls, drive):
+    views = drive(halls.grid, START, TURN, WIDE)
+    last = views[-1].T_odom_base
+    elsewhere = SE2(2.0, 1.5, 1.2)
+    views += drive(halls.grid, elsewhere, TURN, WIDE, odometry=last @ SE2(0.3, 0.0, 0.0))
+    beliefs = told(views, halls)
+    assert not any(is_at(b.places[0].pose, START, 1.0) for b in beliefs[-3:])
+    assert beliefs[-1].verdict is Verdict.UNIQUE
+    assert is_at(beliefs[-1].places[0].pose, end_of(elsewhere, TURN))
+
+
+@pytest.mark.parametrize(
+    ("step", "news"),
+    [
+        (SE2(0.0, 0.0, 0.0), False),
+        (SE2(0.2, 0.1, 0.1), False),
+        (SE2(0.31, 0.0, 0.0), True),
+        (SE2(0.0, 0.0, -0.3), True),
+    ],
+)
+def test_news_is_motion(halls, drive, step, news):
+    (view,) = drive(halls.grid, START, [])
+    assert brings_news(begin(halls), view.T_odom_base)
+    belief = update(begin(halls), view)
+    assert brings_news(belief, view.T_odom_base @ step) is news
+
+
+# --- what says nothing ---
+
+
+def test_a_blind_view_changes_nothing_but_the_prediction(halls, drive):
+    (view,) = drive(halls.grid, START, [])
+    blind = LaserScan(np.full(61, np.nan), -0.5, 0.0175, 0.1, 5.0)
+    first = update(begin(halls), View.of(blind, view.T_odom_base))
+    assert first.verdict is Verdict.NO_MATCH
+    assert "0 beams measured a surface" in first.reason
+    assert first.elsewhere == 1.0
+    assert first.places == ()
+    belief = update(begin(halls), view)
+    step = SE2(0.3, 0.0, 0.0)
+    after = update(belief, View.of(blind, view.T_odom_base @ step))
+    np.testing.assert_array_equal(after.probabilities, belief.probabilities)
+    assert is_at(after.places[0].pose, belief.places[0].pose @ step, 1e-9, 1e-6)
+
+
+# --- priors ---
+
+
+def test_a_hint_decides_between_places_that_look_the_same(four_rooms, drive):
+    start = SE2(*four_rooms.grid.to_map(np.array([60.0, 60.0])).tolist(), 0.5)
+    (view,) = drive(four_rooms.grid, start, [], WIDE)
+    belief = update(begin(four_rooms, Near(start @ SE2(0.3, 0.3, 0.2), 1.0)), view)
+    assert is_at(belief.places[0].pose, start)
+    assert belief.verdict is Verdict.UNIQUE
+
+
+def test_evidence_overrules_a_hint(room, drive):
+    truth = SE2(5.0, 2.5, 0.4)
+    (view,) = drive(room.grid, truth, [], WIDE)
+    belief = update(begin(room, Near(SE2(3.0, 4.0, 2.0), 0.5, 0.3)), view)
+    assert is_at(belief.places[0].pose, truth)
+
+
+def test_few_places_are_held_when_told_so(halls, drive):
+    (view,) = drive(halls.grid, START, [])
+    belief = update(begin(halls, config=BeliefConfig(places=5)), view)
+    assert len(belief.probabilities) <= 5
+    assert belief.probabilities.sum() + belief.elsewhere == pytest.approx(1.0)
