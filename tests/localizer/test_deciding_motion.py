@@ -1,7 +1,8 @@
-"""The motion asked for tells places apart, and can be driven at all of them."""
+"""The requested motion decides between places, and can be driven at all of them."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -31,17 +32,17 @@ def moved(motion: MotionRequest) -> SE2:
     return SE2(0.0, 0.0, motion.turn) @ SE2(motion.ahead, 0.0, 0.0)
 
 
-def test_a_robot_that_must_look_behind_itself_is_asked_to_turn(two_rooms, half_lidar):
+def test_a_robot_whose_places_differ_behind_it_turns(two_rooms, half_lidar):
     other = SE2(7.0, 0.0, 0.0) @ POSE
     scan = seen(two_rooms, POSE, half_lidar)
     motion = deciding_motion(scan, places(POSE, other), two_rooms)
     assert motion is not None
     assert motion.stamp == scan.stamp
     assert abs(motion.turn) > math.radians(80.0)
-    assert 0.1 < motion.gain <= 1.0
-    # What is gained is what the sensor would see.
+    # All of the uncertainty goes: the sensor sees different ranges there.
+    assert motion.gain == pytest.approx(math.log(2.0), abs=0.1)
     views = [seen(two_rooms, pose @ moved(motion), half_lidar).ranges for pose in (POSE, other)]
-    assert np.mean(np.abs(views[0] - views[1]) > 0.3) == pytest.approx(motion.gain, abs=0.1)
+    assert np.mean(np.abs(views[0] - views[1]) > 0.3) > 0.1
 
 
 def test_which_place_comes_first_makes_no_difference_between_two(two_rooms, half_lidar):
@@ -52,20 +53,33 @@ def test_which_place_comes_first_makes_no_difference_between_two(two_rooms, half
     assert there == back
 
 
-def test_nothing_is_asked_for_where_nothing_would_help(three_rooms):
+def test_no_motion_is_requested_between_identical_rooms(three_rooms):
     lidar = Lidar(beams=180)
     scan = seen(three_rooms, POSE, lidar)
     rooms = places(*(SE2(8.0 * i, 0.0, 0.0) @ POSE for i in range(3)))
     assert deciding_motion(scan, rooms, three_rooms) is None
 
 
-def test_one_twin_among_the_places_is_enough(three_rooms):
-    """Telling the first from the third is worth nothing while it looks like the second."""
-    lidar = Lidar(beams=180)
-    scan = seen(three_rooms, POSE, lidar)
-    twin, stranger = SE2(8.0, 0.0, 0.0) @ POSE, SE2(5.0, 3.0, 2.0)
-    assert deciding_motion(scan, places(POSE, stranger), three_rooms) is not None
-    assert deciding_motion(scan, places(POSE, stranger, twin), three_rooms) is None
+def test_the_gain_is_the_entropy_that_is_expected_to_go(two_rooms, half_lidar):
+    """Of three places two are identical: what is left in two cases of three is log 2."""
+    other = SE2(7.0, 0.0, 0.0) @ POSE
+    scan = seen(two_rooms, POSE, half_lidar)
+    motion = deciding_motion(scan, places(POSE, POSE, other), two_rooms)
+    assert motion is not None
+    assert motion.gain == pytest.approx(math.log(3.0) - 2.0 / 3.0 * math.log(2.0), abs=0.1)
+
+
+def test_what_differs_already_here_is_no_gain(three_rooms):
+    """The present scan has not decided, although the map expects other ranges."""
+    scan = seen(three_rooms, POSE, Lidar(beams=180))
+    assert deciding_motion(scan, places(POSE, SE2(5.0, 3.0, 2.0)), three_rooms) is None
+
+
+def test_places_that_are_no_rivals_do_not_count(two_rooms, half_lidar):
+    here, there = places(POSE, SE2(7.0, 0.0, 0.0) @ POSE)
+    scan = seen(two_rooms, POSE, half_lidar)
+    unlikely = dataclasses.replace(there, probability=0.04)
+    assert deciding_motion(scan, [here, unlikely], two_rooms) is None
 
 
 @pytest.mark.parametrize("n", [0, 1])
@@ -76,8 +90,9 @@ def test_there_must_be_something_to_decide(hall_plan, n):
 
 
 def test_the_way_is_free_wherever_the_robot_is(office):
-    lidar, asked_to_drive = Lidar(beams=60, range_max=3.0), 0
-    drawn = random_free_poses(office, np.random.default_rng(0), 120, 0.3)
+    """A sensor of 1 m reach sees nothing at any of the places: only a drive can help."""
+    lidar, asked_to_drive = Lidar(beams=60, range_max=1.0), 0
+    drawn = random_free_poses(office, np.random.default_rng(0), 40, 1.05)
     for first, second in zip(drawn[::2], drawn[1::2], strict=True):
         motion = deciding_motion(seen(office, first, lidar), places(first, second), office)
         if motion is None or motion.ahead == 0.0:
@@ -89,22 +104,20 @@ def test_the_way_is_free_wherever_the_robot_is(office):
     assert asked_to_drive > 5
 
 
-def test_who_cannot_drive_may_turn(two_rooms, half_lidar):
-    """At one of the places the robot stands before a wall on every side that would help."""
+def test_a_robot_without_space_to_drive_turns(two_rooms, half_lidar):
+    """The places differ behind the robot, and at one of them a wall stands close behind it."""
     other = SE2(7.0, 0.0, 0.0) @ POSE
-    boxed = two_rooms.cells.copy()
-    ring = [(1.95, 1.45, 3.05, 1.55), (1.95, 2.45, 3.05, 2.55)]
-    ring += [(1.95, 1.45, 2.05, 2.55), (2.95, 1.45, 3.05, 2.55)]
-    for west, south, east, north in ring:
-        (x0, y0), (x1, y1) = np.rint(two_rooms.to_cells(np.array([[west, south], [east, north]])))
-        boxed[int(y0) : int(y1), int(x0) : int(x1)] = 100
-    grid = type(two_rooms)(boxed, two_rooms.resolution, two_rooms.T_map_grid)
+    walled = two_rooms.cells.copy()
+    (x0, y0), (x1, y1) = np.rint(two_rooms.to_cells(np.array([[2.05, 1.5], [2.1, 2.5]])))
+    walled[int(y0) : int(y1), int(x0) : int(x1)] = 100
+    grid = type(two_rooms)(walled, two_rooms.resolution, two_rooms.T_map_grid)
     motion = deciding_motion(seen(grid, POSE, half_lidar), places(POSE, other), grid)
     assert motion is not None
     assert motion.ahead == 0.0
+    assert abs(motion.turn) > math.radians(80.0)
 
 
-def test_a_sensor_that_sees_nothing_asks_for_nothing(hall_plan):
+def test_a_sensor_that_sees_nothing_leads_to_no_request(hall_plan):
     lidar = Lidar(beams=60, range_max=0.2)
     poses = [SE2(4.0, 3.0, 1.0), SE2(3.0, 3.0, -1.0)]
     assert deciding_motion(seen(hall_plan, poses[0], lidar), places(*poses), hall_plan) is None

@@ -105,6 +105,9 @@ def test_twins_are_told_and_none_is_published(robot_in, three_rooms, of, kinds, 
     robot = robot_in(three_rooms, IN_A_ROOM)
     outputs = robot.tick()
     assert kinds(outputs) == [Hypotheses, Status]  # no motion inside would help
+    (status,) = of(Status, outputs)
+    said = "3 places look identical to this sensor; no motion of up to 3 m would decide"
+    assert status.reason == said
     assert robot.localizer.state is State.DISAMBIGUATING
     rooms = [place.pose.x - IN_A_ROOM.x for place in outputs[0].places if place.probability > 0.1]
     assert sorted(round(x) for x in rooms) == [-8, 0, 8]

@@ -1,4 +1,4 @@
-"""Which motion would tell several places apart."""
+"""Which motion is expected to decide between several places."""
 
 from __future__ import annotations
 
@@ -13,21 +13,29 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.raycast import expected_ranges
+from firstfix.global_localization.verdict import RIVAL_SHARE, log_likelihoods
 from firstfix.localizer.outputs import MotionRequest
 
+FARTHEST_M = 3.0
+"""Longest drive that is considered, m."""
+
 _TURNS = tuple(math.radians(degrees) for degrees in (0, 45, -45, 90, -90, 135, -135, 180))
-_AHEAD_M = (0.0, 1.0, 2.0, 3.0)
-_PLACES = 6
+_AHEAD_M = (0.0, 1.0, 2.0, FARTHEST_M)
+_PLACES = 8
 _BEAMS = 48
+_REACH_M = 30.0
 
-# Farther than the map is true, a beam tells two places apart.
+# A beam differs between two places if its ranges there differ by more than maps are precise, m.
+# Such beams cost about as much as one that sees through a wall; all others as much as usual, nats.
 _DIFFERENT_M = 0.3
-# A motion must tell at least this share of beams apart to be worth asking for, and every metre must
-# buy some.
-_LEAST_GAIN = 0.05
-_COST_PER_M = 0.02
+_DIFFERENT_COST = 3.0
+_USUAL_COST = 0.3
 
-# Room that a robot needs on its way, in front and at its sides.
+# A motion must remove this fraction of the entropy, and every metre costs so much of it.
+_LEAST_FRACTION = 0.1
+_FRACTION_PER_M = 0.02
+
+# Space that a robot needs on its way, in front and at its sides.
 _ROOM_M = 0.5
 _SIDES_RAD = (-0.3, 0.0, 0.3)
 
@@ -35,55 +43,73 @@ _SIDES_RAD = (-0.3, 0.0, 0.3)
 def deciding_motion(
     scan: LaserScan, places: Sequence[Hypothesis], grid: OccupancyGrid
 ) -> MotionRequest | None:
-    """Find the turn and way after which the likeliest place looks least like any other.
+    """Find the motion that reduces the expected entropy over the places most.
 
     Parameters
     ----------
     scan : LaserScan
-        The scan that left the places open: it says what the sensor can see.
+        The scan that left the places open: it tells what the sensor can see.
     places : sequence of Hypothesis
-        Most likely first; the first six are told apart.
+        Most likely first; the first eight that are rivals of the best are compared.
     grid : OccupancyGrid
         The map.
 
     Returns
     -------
     MotionRequest or None
-        The motion, free of walls at all of these places; None if none of those tried would help.
+        A turn and a drive that is free of walls at all of these places. None if no motion of up to
+        `FARTHEST_M` is worth it: the places look identical to this sensor from all over there.
     """
-    poses = [place.pose for place in places[:_PLACES]]
-    best: MotionRequest | None = None
+    if len(places) < 2:
+        return None
+    rivals = [p for p in places[:_PLACES] if p.probability >= RIVAL_SHARE * places[0].probability]
+    poses = [place.pose for place in rivals]
+    weights = np.array([place.probability for place in rivals])
+    weights /= weights.sum()
+    now = _entropy(weights)
+    # What the map expects to differ already here, the scan has not decided.
+    here = _expected_entropy(_views(scan, poses, SE2.identity(), grid), weights)
+    best, best_worth = None, -math.inf
     for turn in _TURNS:
-        room = min((_room_ahead(grid, pose, turn) for pose in poses), default=0.0)
+        room = min(_room_ahead(grid, pose, turn) for pose in poses)
         for ahead in _AHEAD_M:
             if ahead > 0.0 and room < ahead + _ROOM_M:
                 continue
-            gain = _gain(scan, poses, SE2(0.0, 0.0, turn) @ SE2(ahead, 0.0, 0.0), grid)
-            worth = gain - _COST_PER_M * ahead
-            if gain >= _LEAST_GAIN and (
-                best is None or worth > best.gain - _COST_PER_M * best.ahead
-            ):
-                best = MotionRequest(scan.stamp, turn, ahead, gain)
+            T_base_moved = SE2(0.0, 0.0, turn) @ SE2(ahead, 0.0, 0.0)
+            gain = here - _expected_entropy(_views(scan, poses, T_base_moved, grid), weights)
+            worth = gain - _FRACTION_PER_M * ahead * now
+            if gain > _LEAST_FRACTION * now and worth > best_worth:
+                best, best_worth = MotionRequest(scan.stamp, turn, ahead, gain), worth
     return best
 
 
 def _room_ahead(grid: OccupancyGrid, T_map_base: SE2, turn: float) -> float:
     bearings = turn + np.array(_SIDES_RAD)
-    return float(expected_ranges(grid, T_map_base, bearings, max(_AHEAD_M) + 1.0).min())
+    return float(expected_ranges(grid, T_map_base, bearings, FARTHEST_M + 1.0).min())
 
 
-def _gain(scan: LaserScan, poses: Sequence[SE2], T_base_moved: SE2, grid: OccupancyGrid) -> float:
-    """Share of beams that would differ between the first place and the one most like it."""
-    chosen = np.linspace(0, len(scan) - 1, min(_BEAMS, len(scan))).round().astype(np.int64)
-    bearings = scan.bearings[chosen]
-    views = [_view(scan, pose @ T_base_moved, bearings, grid) for pose in poses]
-    gains = [float(np.mean(np.abs(view - views[0]) > _DIFFERENT_M)) for view in views[1:]]
-    return min(gains, default=0.0)
-
-
-def _view(
-    scan: LaserScan, T_map_base: SE2, bearings: NDArray[np.float64], grid: OccupancyGrid
+def _views(
+    scan: LaserScan, poses: Sequence[SE2], T_base_moved: SE2, grid: OccupancyGrid
 ) -> NDArray[np.float64]:
-    reach = min(scan.range_max, 30.0)
-    ranges = expected_ranges(grid, T_map_base @ scan.T_base_laser, bearings, reach)
-    return np.minimum(ranges, reach)
+    """Return the ranges expected after a motion, shape (places, beams), m."""
+    chosen = np.linspace(0, len(scan) - 1, min(_BEAMS, len(scan))).round().astype(np.int64)
+    reach = min(scan.range_max, _REACH_M)
+    T_base_laser = T_base_moved @ scan.T_base_laser
+    bearings = scan.bearings[chosen]
+    views = [expected_ranges(grid, pose @ T_base_laser, bearings, reach) for pose in poses]
+    return np.minimum(views, reach)
+
+
+def _expected_entropy(views: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
+    """Return the mean entropy after one view, over the places where the robot may be, nats."""
+    differs = np.abs(views[:, None] - views[None]) > _DIFFERENT_M
+    costs = _USUAL_COST + _DIFFERENT_COST * differs.mean(axis=2)
+    logs = log_likelihoods(costs, views.shape[1])
+    posterior = weights * np.exp(logs - logs.max(axis=1, keepdims=True))
+    posterior /= posterior.sum(axis=1, keepdims=True)
+    return float(sum(w * _entropy(row) for w, row in zip(weights, posterior, strict=True)))
+
+
+def _entropy(probabilities: NDArray[np.float64]) -> float:
+    positive = probabilities[probabilities > 0.0]
+    return float(-(positive * np.log(positive)).sum())

@@ -20,7 +20,7 @@ from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.localizer.agreement import AgreementCounter, is_new_view
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.contest import Contest, Standing
-from firstfix.localizer.deciding_motion import deciding_motion
+from firstfix.localizer.deciding_motion import FARTHEST_M, deciding_motion
 from firstfix.localizer.inputs import Input, NewMap, NoMotionUpdate, PoseHint, Reset
 from firstfix.localizer.outputs import Hypotheses, InitialPose, Output, Status
 from firstfix.localizer.pose_monitor import Fit
@@ -245,7 +245,7 @@ class Localizer:
         self._contest = self._contest_of(result.hypotheses, T_odom_base)
         self._compared_at = scan.stamp
         self._fire(Event.SEVERAL_PLACES_FIT)
-        return self._list_places(scan, self._contest, result.reason)
+        return self._list_places(scan, self._contest)
 
     def _disambiguate(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
         contest = self._contest
@@ -264,10 +264,7 @@ class Localizer:
         if standing is Standing.LOST:
             reason = "no remaining place explains the scans: searching"
             return [self._restart(scan.stamp, Event.CONTRADICTED, reason)]
-        reason = f"the best place has a probability of {best.probability:.0%}"
-        if contest.rivals > 1:
-            reason = f"{contest.rivals} places fit about as well; motion would decide"
-        return self._list_places(scan, contest, reason)
+        return self._list_places(scan, contest)
 
     def _verify_hint(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
         hint = self._hint
@@ -401,9 +398,16 @@ class Localizer:
     def _contest_of(self, places: Sequence[Hypothesis], T_odom_base: SE2) -> Contest:
         return Contest(tuple(places), T_odom_base, self._matcher, self.config.monitor, self._ids)
 
-    def _list_places(self, scan: LaserScan, contest: Contest, reason: str) -> list[Output]:
-        places = contest.places
+    def _list_places(self, scan: LaserScan, contest: Contest) -> list[Output]:
+        places, rivals = contest.places, contest.rivals
         motion = deciding_motion(scan, places, self._matcher.fields.grid)
+        if rivals <= 1:
+            reason = f"the best place has a probability of {places[0].probability:.0%}"
+        elif motion is not None:
+            reason = f"{rivals} places fit about equally well; motion would decide"
+        else:
+            reason = f"{rivals} places look identical to this sensor; no motion of up to "
+            reason += f"{FARTHEST_M:.0f} m would decide"
         outputs: list[Output] = [
             Hypotheses(scan.stamp, places),
             self._status(scan.stamp, reason, places[0].evidence),

@@ -90,7 +90,7 @@ class Hypotheses:
 
 @dataclass(frozen=True, slots=True)
 class MotionRequest:
-    """A motion after which the places would look different.
+    """The motion that is expected to decide between the places.
 
     Parameters
     ----------
@@ -101,13 +101,7 @@ class MotionRequest:
     ahead : float
         Then drive, m; 0 to turn only.
     gain : float
-        Share of the beams by which the best place would differ from the most similar other one.
-
-    Examples
-    --------
-    >>> request = ff.MotionRequest(stamp=0.1, turn=1.57, ahead=0.5, gain=0.3)
-    >>> f"turn {request.turn} rad, then drive {request.ahead} m"
-    'turn 1.57 rad, then drive 0.5 m'
+        Entropy over the places that the view from there is expected to remove, nats.
     """
 
     stamp: float
