@@ -102,7 +102,7 @@ def test_a_picture_of_no_known_kind(cli, unique: Files, name: str) -> None:
 
 def test_the_folder_of_a_picture_must_exist(cli, unique: Files) -> None:
     for command in (("locate", *unique), ("demo",), ("map", "show", unique[0])):
-        assert_one_line(cli(*command, "--plot", "missing/a.png"), "no folder missing")
+        assert_one_line(cli(*command, "--plot", "missing/a.png"), "no such folder: missing")
     assert not Path("missing").exists()
 
 

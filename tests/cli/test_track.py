@@ -171,7 +171,7 @@ def test_a_saved_pose_begins_the_next_part_of_a_drive(
     assert saved.T_odom_base is not None
     ended = cli("track", files[0], "second.npz", "--start", "last.json", "--json")
     assert ended.status == 0, ended
-    assert "carried on by odometry" in ended.err
+    assert "moved along with odometry" in ended.err
     document = strict_json(ended.out)
     assert document["start"]["origin"] == "saved"
     assert document["ape"]["max_m"] < 0.3
@@ -197,7 +197,7 @@ def test_a_saved_pose_of_another_map_is_refused(
 ) -> None:
     assert cli("track", *files, "--save-pose", "last.json").status == 0
     ended = cli("track", alike[0], files[1], "--start", "last.json")
-    assert_one_line(ended, "the map is another one", "firstfix locate")
+    assert_one_line(ended, "it is a pose in another map", "firstfix locate")
 
 
 def test_a_log_without_odometry(cli, files: tuple[Path, Path], drive: Path, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A file is there as a whole, old or new, whatever happens while it is written."""
+"""A file is complete, old or new, whatever happens during writing."""
 
 import os
 import subprocess
@@ -23,13 +23,13 @@ def failing() -> Iterator[bytes]:
     raise OSError(28, "No space left on device")
 
 
-def test_what_is_written_is_read(tmp_path):
+def test_written_bytes_are_read(tmp_path):
     replace_file(tmp_path / "a", [b"one ", b"two"])
     assert read_bytes(tmp_path / "a", what="a text", limit=7) == b"one two"
     assert names(tmp_path) == ["a"]
 
 
-def test_an_error_while_writing_leaves_the_old_file_and_nothing_else(tmp_path):
+def test_an_error_during_writing_leaves_only_the_old_file(tmp_path):
     (tmp_path / "a").write_bytes(b"old")
     with pytest.raises(InputError, match="No space left"):
         replace_file(tmp_path / "a", failing())
@@ -37,7 +37,7 @@ def test_an_error_while_writing_leaves_the_old_file_and_nothing_else(tmp_path):
     assert names(tmp_path) == ["a"]
 
 
-def test_an_error_while_renaming_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
+def test_an_error_during_renaming_leaves_only_the_old_file(tmp_path, monkeypatch):
     (tmp_path / "a").write_bytes(b"old")
 
     def refuse(*_args):
@@ -50,7 +50,7 @@ def test_an_error_while_renaming_leaves_the_old_file_and_nothing_else(tmp_path, 
     assert names(tmp_path) == ["a"]
 
 
-def test_two_writers_and_a_reader_who_never_sees_a_mixture(tmp_path):
+def test_readers_never_see_a_mixture_of_two_writers(tmp_path):
     path = tmp_path / "a"
     path.write_bytes(b"0" * 10_000)
 
@@ -69,9 +69,7 @@ def test_two_writers_and_a_reader_who_never_sees_a_mixture(tmp_path):
     assert names(tmp_path) == ["a"]
 
 
-def test_a_disk_that_is_full_after_any_byte_leaves_the_old_file_and_nothing_else(
-    tmp_path, full_after
-):
+def test_a_full_disk_leaves_only_the_old_file(tmp_path, full_after):
     (tmp_path / "a").write_bytes(b"old")
     for size in range(40):
         with full_after(size), pytest.raises(InputError, match="File too large"):
@@ -119,7 +117,7 @@ assert read_bytes(file, what="a text", limit=10) == b"new"
 """
 
 
-def test_a_disk_that_is_full_and_one_that_is_read_only_keep_the_old_file(on_small_disk):
+def test_full_and_read_only_disks_keep_the_old_file(on_small_disk):
     on_small_disk(FULL_THEN_READ_ONLY)
 
 
@@ -143,14 +141,14 @@ for _ in range(60):
 """
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes that are copies")
-def test_whoever_is_killed_while_writing_leaves_an_old_file_or_a_new_one(tmp_path):
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_killed_writer_leaves_the_old_or_the_new_file(tmp_path):
     command = [sys.executable, "-c", KILLED, tmp_path / "a"]
     done = subprocess.run(command, capture_output=True, check=False)
     assert done.returncode == 0, done.stderr.decode()
 
 
-def test_drafts_of_those_who_were_killed_are_cleared_after_an_hour(tmp_path):
+def test_drafts_of_killed_processes_are_removed_after_an_hour(tmp_path):
     old, new = (tmp_path / f".{letter * 32}.draft" for letter in "ab")
     others = [tmp_path / name for name in (".letter.draft", f"{'a' * 32}.draft", ".a", "b")]
     for path in (old, new, *others):
@@ -168,7 +166,7 @@ def whole_or_nothing(path: Path) -> bytes:
         return b""
 
 
-def test_a_file_that_comes_and_goes_is_read_whole_or_not_at_all(tmp_path):
+def test_a_file_that_is_replaced_and_removed_is_read_completely_or_not(tmp_path):
     path, is_over = tmp_path / "a", threading.Event()
 
     def come_and_go() -> None:
@@ -187,7 +185,7 @@ def test_a_file_that_comes_and_goes_is_read_whole_or_not_at_all(tmp_path):
     assert outcomes == {b"", b"1" * 5_000}
 
 
-def test_a_link_stays_one(tmp_path):
+def test_a_symbolic_link_is_followed(tmp_path):
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "a").write_bytes(b"old")
     (tmp_path / "link").symlink_to(tmp_path / "folder" / "a")
@@ -199,7 +197,7 @@ def test_a_link_stays_one(tmp_path):
 @pytest.mark.parametrize(
     "name", ["no folder/a", "folder", "pipe", "ring", "x\0y", "\ud800", "a" * 300]
 )
-def test_where_no_file_can_be_written(tmp_path, name):
+def test_impossible_paths_are_rejected(tmp_path, name):
     (tmp_path / "folder").mkdir()
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "ring").symlink_to(tmp_path / "ring")
@@ -211,20 +209,20 @@ def test_where_no_file_can_be_written(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", ["missing", "folder", "pipe", "x\0y", "\ud800"])
-def test_what_is_no_file_to_read(tmp_path, name):
+def test_missing_files_folders_and_pipes_are_rejected(tmp_path, name):
     (tmp_path / "folder").mkdir()
-    os.mkfifo(tmp_path / "pipe")  # reading it would wait for ever
+    os.mkfifo(tmp_path / "pipe")  # reading it would block
     with pytest.raises(InputError, match="expected a text, received no file"):
         read_bytes(tmp_path / name, what="a text", limit=10)
 
 
-def test_a_file_larger_than_its_limit(tmp_path):
+def test_a_file_above_its_limit_is_rejected(tmp_path):
     (tmp_path / "a").write_bytes(bytes(11))
     with pytest.raises(InputError, match="a text of at most 10 bytes"):
         read_bytes(tmp_path / "a", what="a text", limit=10)
 
 
-def test_a_file_without_permission(tmp_path, monkeypatch):
+def test_a_file_without_permission_is_rejected(tmp_path, monkeypatch):
     (tmp_path / "a").touch()
 
     def refuse(*_args, **_kwargs):

@@ -1,4 +1,4 @@
-"""A pose outlives a restart unharmed, and a damaged one is refused."""
+"""A saved pose is loaded unchanged, and a damaged one is rejected."""
 
 import json
 import math
@@ -55,14 +55,14 @@ POSES = st.builds(SE2, LENGTHS, LENGTHS, st.floats(-4.0, 4.0))
     map_key=st.text(min_size=1, max_size=200),
     root=st.lists(st.floats(-1e5, 1e5), min_size=9, max_size=9),
 )
-def test_what_is_saved_is_loaded(tmp_path, T_map_base, T_odom_base, stamp, map_key, root):
+def test_a_saved_pose_is_loaded_unchanged(tmp_path, T_map_base, T_odom_base, stamp, map_key, root):
     matrix = np.array(root).reshape(3, 3)
     saved = SavedPose(T_map_base, matrix @ matrix.T, stamp, T_odom_base, map_key)
     save_pose(tmp_path / "pose.json", saved)
     assert_same(load_pose(tmp_path / "pose.json"), saved)
 
 
-def test_the_covariance_is_a_copy_that_nobody_changes():
+def test_the_covariance_is_a_read_only_copy():
     matrix = COVARIANCE.copy()
     saved = pose(covariance=matrix)
     matrix[0, 0] = 1.0
@@ -71,7 +71,7 @@ def test_the_covariance_is_a_copy_that_nobody_changes():
         saved.covariance[0, 0] = 1.0
 
 
-def test_no_uncertainty_at_all_is_a_covariance_too():
+def test_a_covariance_of_zeros_is_valid():
     assert_array_equal(pose(covariance=np.zeros((3, 3))).covariance, np.zeros((3, 3)))
 
 
@@ -92,14 +92,14 @@ def test_no_uncertainty_at_all_is_a_covariance_too():
         ({"T_odom_base": SE2(0.0, -1e10, 0.0)}, "position"),
     ],
 )
-def test_what_is_no_pose_to_keep(changes, says):
+def test_invalid_poses_are_rejected(changes, says):
     with pytest.raises(InputError, match=says):
         pose(**changes)
 
 
 @pytest.fixture
 def damaged(tmp_path):
-    """Give a function that writes a good file but for one entry, as JSON text, and loads it."""
+    """Return a function that loads a file with one changed entry, given as JSON text."""
 
     def damaged(key: str, value: str) -> SavedPose:
         save_pose(tmp_path / "pose.json", pose())
@@ -117,7 +117,7 @@ def damaged(tmp_path):
     ["[1, 2]", "[1, 2, 3, 4]", "[1, 2, NaN]", "[1, 2, Infinity]", "[1, 2, 1e999]", "[1, 2, true]",
      '[1, 2, "3"]', "[1, 2, [3]]", "7", '"x"', "{}", "[1e10, 0, 0]", "[1" + "0" * 400 + ", 0, 0]"],
 )  # fmt: skip
-def test_damaged_poses(damaged, key, value):
+def test_invalid_poses_in_a_file_are_rejected(damaged, key, value):
     with pytest.raises(InputError, match=r"pose\.json.*delete the file"):
         damaged(key, value)
 
@@ -143,7 +143,7 @@ def test_damaged_poses(damaged, key, value):
         ("format", "[]"),
     ],
 )
-def test_damaged_entries(damaged, key, value):
+def test_invalid_entries_are_rejected(damaged, key, value):
     with pytest.raises(InputError, match=r"pose\.json.*delete the file"):
         damaged(key, value)
 
@@ -159,7 +159,7 @@ def test_integers_are_numbers_and_odometry_may_be_missing(damaged):
     [b"", b"{", b"[]", b"null", b"[" * 16_000, b'{"a":' * 3_000, b"\xff\xfe\x00", b"\0" * 100,
      b"1" * 16_000, b'{"format": "firstfix saved pose 1"}', b"{}" + b" " * 20_000],
 )  # fmt: skip
-def test_what_is_no_saved_pose(tmp_path, data):
+def test_other_files_are_rejected(tmp_path, data):
     (tmp_path / "pose.json").write_bytes(data)
     with pytest.raises(InputError, match=r"pose\.json") as caught:
         load_pose(tmp_path / "pose.json")
@@ -168,7 +168,7 @@ def test_what_is_no_saved_pose(tmp_path, data):
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
-def test_a_file_cut_or_changed_anywhere_is_read_or_refused(tmp_path, data):
+def test_a_damaged_file_is_read_or_rejected(tmp_path, data):
     save_pose(tmp_path / "pose.json", pose())
     content = bytearray((tmp_path / "pose.json").read_bytes())
     for _ in range(data.draw(st.integers(1, 3))):
@@ -176,15 +176,15 @@ def test_a_file_cut_or_changed_anywhere_is_read_or_refused(tmp_path, data):
         content[at] = data.draw(st.sampled_from(b'0e.-,[]{}":nN \xff'))
     cut = data.draw(st.integers(0, len(content)))
     (tmp_path / "pose.json").write_bytes(content[:cut] if cut % 2 else content)
-    refusal = ""
+    message = ""
     try:
         load_pose(tmp_path / "pose.json")
     except InputError as error:
-        refusal = str(error)
-    assert "\n" not in refusal
+        message = str(error)
+    assert "\n" not in message
 
 
-def test_a_file_cut_at_any_byte_is_refused(tmp_path):
+def test_a_truncated_file_is_rejected(tmp_path):
     path = tmp_path / "pose.json"
     save_pose(path, pose())
     content = path.read_bytes()
@@ -197,12 +197,12 @@ def test_a_file_cut_at_any_byte_is_refused(tmp_path):
     assert_same(load_pose(path), pose())
 
 
-def test_there_is_none(tmp_path: Path):
+def test_a_missing_file_is_rejected(tmp_path: Path):
     with pytest.raises(InputError, match="expected a saved pose, received no file"):
         load_pose(tmp_path / "pose.json")
 
 
-def test_a_disk_that_is_full_after_any_byte_leaves_the_old_pose(tmp_path, full_after):
+def test_a_full_disk_leaves_the_old_pose(tmp_path, full_after):
     save_pose(tmp_path / "pose.json", pose())
     whole = (tmp_path / "pose.json").stat().st_size
     for size in range(whole):
@@ -215,7 +215,7 @@ def test_a_disk_that_is_full_after_any_byte_leaves_the_old_pose(tmp_path, full_a
     assert load_pose(tmp_path / "pose.json").stamp == 1700000001.123
 
 
-def test_two_robots_that_share_a_file_by_mistake_leave_a_whole_pose(tmp_path):
+def test_two_threads_that_share_a_file_leave_a_complete_pose(tmp_path):
     path = tmp_path / "pose.json"
     poses = [pose(map_key=letter * 200) for letter in "ab"]
     save_pose(path, poses[0])
@@ -248,7 +248,7 @@ for i in range(200):
 
 
 @pytest.mark.slow
-def test_two_processes_that_share_a_file_leave_a_whole_pose(tmp_path):
+def test_two_processes_that_share_a_file_leave_a_complete_pose(tmp_path):
     path = tmp_path / "pose.json"
     save_pose(path, pose(map_key="a" * 200))
     writers = [
@@ -261,7 +261,7 @@ def test_two_processes_that_share_a_file_leave_a_whole_pose(tmp_path):
     assert [found.name for found in tmp_path.iterdir()] == ["pose.json"]
 
 
-def test_a_map_is_known_again_by_its_cells_and_where_they_lie():
+def test_the_key_depends_on_cells_and_place_of_a_map():
     cells = np.zeros((3, 4), np.int8)
     wall = cells.copy()
     wall[1, 2] = 100

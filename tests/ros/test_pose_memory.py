@@ -189,8 +189,8 @@ def test_a_saved_pose_is_carried_on_by_odometry(memory_of, hall_plan, file, line
     ((severity, text),) = lines
     assert severity is Severity.INFO
     assert text == (
-        "the saved pose is carried on by odometry: saved 100 s ago; "
-        "odometry says that the robot has moved 0.10 m since"
+        "the saved pose is moved along with odometry: saved 100 s ago; "
+        "the robot has moved 0.10 m since by odometry"
     )
 
 
@@ -210,9 +210,7 @@ def test_a_saved_pose_of_another_map_or_time_is_none(memory_of, hall_plan, file,
     assert at_start(memory_of(), hall_plan) is None
     save_pose(file, saved(hall_plan))
     assert at_start(memory_of(), hall_plan, T_odom_base=SE2(50.0, 5.0, 0.0)) is None
-    assert [text.partition(": ")[0] for _, text in lines] == [
-        "the saved pose is not to be used"
-    ] * 3
+    assert [text.partition(": ")[0] for _, text in lines] == ["the saved pose is not used"] * 3
     assert file.exists()
 
 
@@ -344,7 +342,7 @@ def test_in_a_building_of_equal_rooms_a_restarted_node_knows_its_room(ros2, file
         assert second.pose.distance_to(IN_ROOM_1) < 0.1
         assert second.reason.startswith("LOCALIZED: chosen by the saved pose; ")
         (line,) = [x for x in second.recorder.told(Severity.INFO) if x.startswith("the saved pose")]
-        assert "carried on by odometry" in line
+        assert "moved along with odometry" in line
 
 
 def test_a_robot_that_was_pushed_a_little_meanwhile_is_found_there(ros2, file):

@@ -167,10 +167,10 @@ def _saved(path: Path, grid: OccupancyGrid, recording: Recording) -> Start:
     if recalled.T_map_base is None:
         raise InputError(
             expected="a saved pose that still holds at the first scan",
-            received=f"{path}: {recalled.why}",
+            received=f"{path}: {recalled.reason}",
             remedy="run `firstfix locate --json`, and give its `pose`: --start X,Y,YAW",
         )
     # The robot may have been nudged since; and a covariance of millimetres would not admit it.
     covariance = saved.covariance + TRUE_START
-    words = f"starting at the pose of {path} {recalled.standing.value} ({recalled.why})"
+    words = f"starting at the pose of {path}, {recalled.outcome.value} ({recalled.reason})"
     return Start(Origin.SAVED, recalled.T_map_base, covariance, words)

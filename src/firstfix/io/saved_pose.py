@@ -1,14 +1,14 @@
-"""The last pose of a robot, kept on disk so that it outlives a restart."""
+"""The last pose of a robot in a JSON file, for the next start."""
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,21 +19,33 @@ from firstfix.fields.cache import content_key
 from firstfix.io.atomic_files import read_bytes, replace_file, show
 
 MAX_POSITION_M = 1e9
-"""No robot is farther from its origin; transforms of such numbers stay finite."""
+"""Largest coordinate; transforms of such numbers stay finite."""
 MAX_VARIANCE = 1e12
-"""Beyond, m² or rad², nothing is known that could be kept."""
+"""Largest variance, m² or rad²."""
 MAX_KEY_LENGTH = 200
 
-_FORMAT = "firstfix saved pose 1"
 # A real one is 500 bytes.
 _MAX_BYTES = 16_384
-# Of the largest entry: what is left of symmetry and of a zero eigenvalue after rounding.
+# Tolerance of symmetry and of zero eigenvalues, as a fraction of the largest entry.
 _ROUNDING = 1e-9
+
+_Row = tuple[float, float, float]
+
+
+class _Document(msgspec.Struct):
+    """The file."""
+
+    format: Literal["firstfix saved pose 1"]
+    map_key: str
+    stamp: float
+    T_map_base: _Row
+    covariance: tuple[_Row, _Row, _Row]
+    T_odom_base: _Row | None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SavedPose:
-    """Where a robot was, how sure that was, and what is needed to judge it later.
+    """A pose with its covariance, and what is needed to verify it later.
 
     Parameters
     ----------
@@ -42,17 +54,17 @@ class SavedPose:
     covariance : ndarray, shape (3, 3)
         Of x (m), y (m), yaw (rad) in the map frame. Made read-only.
     stamp : float
-        When the robot was there, s since the epoch, by the clock of the scans.
+        Time of the pose, s since the epoch, by the clock of the scans.
     T_odom_base : SE2 or None
-        Odometry at this time; None where there is none.
+        Odometry at this time; None if there is none.
     map_key : str
-        Which map this is a pose in, from `map_key`.
+        The map of the pose, from `map_key`.
 
     Raises
     ------
     InputError
-        If a number is not finite or far out of proportion, the covariance is none, or the key is
-        empty or longer than `MAX_KEY_LENGTH`.
+        If a number is not finite or implausible, the covariance is invalid, or the key is empty or
+        longer than `MAX_KEY_LENGTH`.
     """
 
     T_map_base: SE2
@@ -76,46 +88,35 @@ class SavedPose:
 
 
 def map_key(grid: OccupancyGrid) -> str:
-    """Return what tells this map from others: its cells and where they lie.
-
-    Parameters
-    ----------
-    grid : OccupancyGrid
-        The map.
-
-    Returns
-    -------
-    str
-        The same for the same map, whatever file it came from.
-    """
+    """Return a hash of the cells of a map and their place, whatever file it came from."""
     place = np.append(grid.T_map_grid.as_array(), grid.resolution)
     return content_key("map 1", grid.cells, place)
 
 
 def save_pose(path: str | os.PathLike[str], saved: SavedPose) -> None:
-    """Write a pose to a JSON file, all or nothing, also when the power fails meanwhile.
+    """Write a pose to a JSON file, completely or not at all, also if the power fails.
 
     Parameters
     ----------
     path : path-like
-        Where to, in a folder that exists; an existing file is replaced.
+        In an existing folder; an existing file is replaced.
     saved : SavedPose
-        What `load_pose` will return, to the last bit.
+        `load_pose` returns the same numbers.
 
     Raises
     ------
     InputError
-        If it cannot be written; an old file is then as it was.
+        If it cannot be written; an old file is then unchanged.
     """
     document = {
-        "format": _FORMAT,
+        "format": "firstfix saved pose 1",
         "map_key": saved.map_key,
         "stamp": saved.stamp,
         "T_map_base": saved.T_map_base.as_array().tolist(),
         "covariance": saved.covariance.tolist(),
         "T_odom_base": None if saved.T_odom_base is None else saved.T_odom_base.as_array().tolist(),
     }
-    replace_file(Path(path), [json.dumps(document, indent=1).encode(), b"\n"])
+    replace_file(Path(path), [msgspec.json.format(msgspec.json.encode(document), indent=1), b"\n"])
 
 
 def load_pose(path: str | os.PathLike[str]) -> SavedPose:
@@ -129,68 +130,26 @@ def load_pose(path: str | os.PathLike[str]) -> SavedPose:
     Returns
     -------
     SavedPose
-        Checked, but not judged: see `firstfix.io.recalled_pose.recall`.
+        Valid, but possibly outdated: see `firstfix.io.recalled_pose.recall`.
 
     Raises
     ------
     InputError
-        If there is no such file, or it holds anything else.
+        If there is no such file, or it is not a saved pose.
     """
     path = Path(path)
     data = read_bytes(path, what="a saved pose", limit=_MAX_BYTES)
     try:
-        document = json.loads(data)
-    except (ValueError, RecursionError):
-        raise _wrong(path, "JSON", "something else") from None
-    if not isinstance(document, dict) or document.get("format") != _FORMAT:
-        raise _wrong(path, f'a mapping with "format": "{_FORMAT}"', show(document))
-    entry = _Entries(path, document)
-    odometry = None if entry.get("T_odom_base") is None else entry.pose("T_odom_base")
-    pose, covariance = entry.pose("T_map_base"), entry.numbers("covariance", (3, 3))
-    stamp, key = float(entry.numbers("stamp", ())), entry.text("map_key")
-    try:
-        return SavedPose(pose, covariance, stamp, odometry, key)
+        found = msgspec.json.decode(data, type=_Document)
+        T_odom_base = None if found.T_odom_base is None else SE2(*found.T_odom_base)
+        covariance = np.array(found.covariance)
+        return SavedPose(
+            SE2(*found.T_map_base), covariance, found.stamp, T_odom_base, found.map_key
+        )
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+        raise _wrong(path, "a saved pose", show(str(error))) from error
     except InputError as error:
         raise _wrong(path, error.expected, error.received) from error
-
-
-@dataclass(frozen=True, slots=True)
-class _Entries:
-    """The entries of one file."""
-
-    path: Path
-    document: dict[str, Any]
-
-    def get(self, key: str) -> Any:
-        if key not in self.document:
-            raise _wrong(self.path, f"an entry {key}", f"only {show(', '.join(self.document))}")
-        return self.document[key]
-
-    def text(self, key: str) -> str:
-        value = self.get(key)
-        if not isinstance(value, str):
-            raise _wrong(self.path, f"a text for {key}", show(value))
-        return value
-
-    def numbers(self, key: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
-        value = self.get(key)
-        if not _is_numbers(value, shape):
-            expected = f"finite numbers of shape {shape}" if shape else "a finite number"
-            raise _wrong(self.path, f"{expected} for {key}", show(value))
-        return np.array(value, np.float64)
-
-    def pose(self, key: str) -> SE2:
-        return SE2.from_array(self.numbers(key, (3,)))
-
-
-def _is_numbers(value: Any, shape: tuple[int, ...]) -> bool:
-    """Tell whether this is nested lists of numbers that a float can hold, and of this shape."""
-    if shape:
-        fits = isinstance(value, list) and len(value) == shape[0]
-        return fits and all(_is_numbers(item, shape[1:]) for item in value)
-    if isinstance(value, float):
-        return math.isfinite(value)
-    return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
 
 
 def _checked_covariance(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -209,7 +168,7 @@ def _checked_covariance(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _unfit(expected: str, received: str) -> InputError:
-    return InputError(expected=expected, received=received, remedy="look where it comes from")
+    return InputError(expected=expected, received=received, remedy="check the source of the pose")
 
 
 def _wrong(path: Path, expected: str, received: str) -> InputError:

@@ -47,8 +47,8 @@ def check_path(path: Path) -> None:
         )
     if not path.absolute().parent.is_dir():
         raise InputError(
-            expected=f"an existing folder for the picture {path.name}",
-            received=f"no folder {path.parent}",
+            expected="an existing folder for the picture",
+            received=f"no such folder: {path.parent} ({path})",
             remedy="create the folder, or choose another path",
         )
 

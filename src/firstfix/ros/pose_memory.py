@@ -153,7 +153,7 @@ class PoseMemory:
             map_key=self._map_key,
             max_age_s=math.inf,  # the next scan checks it
         )
-        self._log(Severity.INFO, f"the saved pose is {recalled.standing.value}: {recalled.why}")
+        self._log(Severity.INFO, f"the saved pose is {recalled.outcome.value}: {recalled.reason}")
         if recalled.T_map_base is None:
             return None
         return PoseHint(odometry.stamp, recalled.T_map_base, "the saved pose")

@@ -68,14 +68,14 @@ def test_a_sensor_that_moves_on_the_robot_has_no_place(bag) -> None:
     assert recording.odometry is None
 
 
-def test_without_transforms_the_base_is_the_sensor_and_that_is_said(bag) -> None:
+def test_without_transforms_the_base_is_the_sensor_with_a_note(bag) -> None:
     bag.scan(1.0)
     bag.odometry(1.0, 0.0)
     recording = load_bag(bag.write())
     assert recording.scans[0].T_base_laser == SE2.identity()
     assert recording.odometry is None
     assert "no fixed transforms lead from the base to laser" in recording.notes[0]
-    assert "/odom does not tell" in recording.notes[1]
+    assert "/odom has no frame" in recording.notes[1]
 
 
 def test_scans_in_the_frame_of_the_base_need_no_transform(bag) -> None:

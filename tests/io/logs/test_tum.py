@@ -30,7 +30,7 @@ def load(tmp_path):
     return load
 
 
-def test_the_lines_are_the_formats(tmp_path):
+def test_lines_have_the_format_of_tum(tmp_path):
     save_trajectory(PATH, tmp_path / "t.tum")
     comment, first, second = (tmp_path / "t.tum").read_text().splitlines()
     assert comment == "# timestamp tx ty tz qx qy qz qw"
@@ -47,7 +47,7 @@ def test_the_lines_are_the_formats(tmp_path):
     st.lists(FINITE, min_size=1, max_size=5).map(sorted),
     st.lists(st.tuples(FINITE, FINITE, st.floats(-10.0, 10.0)), min_size=5, max_size=5),
 )
-def test_what_is_saved_is_loaded(tmp_path, stamps, poses):
+def test_a_saved_trajectory_is_loaded_unchanged(tmp_path, stamps, poses):
     saved = Trajectory(np.array(stamps), np.array(poses[: len(stamps)]))
     save_trajectory(saved, tmp_path / "t.tum")
     loaded = load_trajectory(tmp_path / "t.tum")
@@ -56,7 +56,7 @@ def test_what_is_saved_is_loaded(tmp_path, stamps, poses):
     assert angle_error(loaded.poses[:, 2], saved.poses[:, 2]).max() < 1e-14
 
 
-def test_comments_blank_lines_and_any_white_space(load):
+def test_comments_blank_lines_and_white_space_are_skipped(load):
     text = b"# by somebody, \xe9\r\n\r\n  1 2 3 4 0 0 0 1  \r\n#\n\n2\t3 4 0 0 0 0 -1"
     assert_array_equal(load(text).poses, [[2, 3, 0], [3, 4, 0]])
 
@@ -68,7 +68,7 @@ def test_a_quaternion_of_few_digits_is_normalised(load):
 
 @pytest.mark.parametrize("yaw", [-3.0, -0.5, 0.0, 1.0, math.pi])
 @pytest.mark.parametrize("tilt_deg", [0.0, 3.0, -4.9])
-def test_a_small_tilt_leaves_the_heading(load, yaw, tilt_deg):
+def test_a_small_tilt_keeps_the_heading(load, yaw, tilt_deg):
     # A rotation by yaw about z of a robot that pitches: q = q_yaw * q_pitch.
     c, s, cp, sp = (f(a / 2) for a in (yaw, math.radians(tilt_deg)) for f in (math.cos, math.sin))
     loaded = load(f"0 0 0 0 {-s * sp} {c * sp} {s * cp} {c * cp}")
@@ -97,7 +97,7 @@ def test_a_small_tilt_leaves_the_heading(load, yaw, tilt_deg):
         ("1" * 5000, "lines of at most 4096 bytes"),
     ],
 )
-def test_a_bad_line_is_named_by_its_number(load, line, says):
+def test_an_invalid_line_is_reported_with_its_number(load, line, says):
     with pytest.raises(InputError, match=says) as caught:
         load(f"# comment\n0 0 0 0 0 0 0 1\n{line}\n")
     assert "line 3 of " in caught.value.received
@@ -105,7 +105,7 @@ def test_a_bad_line_is_named_by_its_number(load, line, says):
 
 
 @pytest.mark.parametrize("text", ["", "# only a comment\n", "\n\n"])
-def test_a_file_without_poses(load, text):
+def test_a_file_without_poses_is_rejected(load, text):
     with pytest.raises(InputError, match="at least one pose"):
         load(text)
 
@@ -116,20 +116,20 @@ def test_a_trajectory_without_poses_is_not_saved(tmp_path):
     assert not (tmp_path / "t.tum").exists()
 
 
-def test_more_poses_than_memory_should_hold(load, monkeypatch):
+def test_too_many_poses_are_rejected(load, monkeypatch):
     monkeypatch.setattr(tum, "MAX_POSES", 3)
     assert len(load("0 0 0 0 0 0 0 1\n" * 3)) == 3
     with pytest.raises(InputError, match="at most 3 poses"):
         load("0 0 0 0 0 0 0 1\n" * 4)
 
 
-def test_an_endless_line_is_not_read_to_its_end(load):
+def test_an_endless_line_is_rejected_early(load):
     with pytest.raises(InputError, match="line 1 of"):
         load(bytes(10_000_000))
 
 
 @pytest.mark.parametrize("name", ["missing.tum", "."])
-def test_what_is_no_file(tmp_path, name):
+def test_paths_without_a_file_are_rejected(tmp_path, name):
     with pytest.raises(InputError, match="expected a TUM trajectory, received no file"):
         load_trajectory(tmp_path / name)
 
@@ -147,7 +147,7 @@ def test_an_error_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["t.tum"]
 
 
-def test_a_folder_that_does_not_exist(tmp_path: Path):
+def test_a_missing_folder_is_rejected(tmp_path: Path):
     with pytest.raises(InputError, match="No such file"):
         save_trajectory(PATH, tmp_path / "no folder" / "t.tum")
 
@@ -160,7 +160,7 @@ WORDS = st.sampled_from(["0", "1", "-1", "0.5", "nan", "1e308", "#", "x", "\n", 
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(st.binary(max_size=80) | st.lists(WORDS, max_size=24).map(lambda w: " ".join(w).encode()))
-def test_any_bytes_become_a_trajectory_or_one_sentence(load, data):
+def test_any_bytes_are_read_or_rejected_in_one_line(load, data):
     refusal = ""
     try:
         load(data)

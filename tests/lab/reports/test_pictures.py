@@ -60,7 +60,7 @@ def test_an_unknown_format_is_refused(tmp_path: Path, hall: OccupancyGrid, name:
 
 def test_a_place_that_cannot_be_written_is_refused(tmp_path: Path, hall: OccupancyGrid) -> None:
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(InputError, match="no folder"):
+    with pytest.raises(InputError, match="no such folder"):
         draw_grid(hall, tmp_path / "file" / "place.png", "a hall")
 
 

@@ -36,5 +36,5 @@ def test_in_one_of_four_equal_rooms_a_node_that_is_restarted_knows_its_room(
     found = watcher.wait_for("initialpose", after=killed)
     assert ros1.error_of(found).is_small
     # It has not moved since it was switched on.
-    assert "the saved pose is as it was saved: saved " in second.said
+    assert "the saved pose is used as it was saved: saved " in second.said
     assert "LOCALIZED: chosen by the saved pose; " in second.said

@@ -31,8 +31,8 @@ from firstfix.io.ros_messages.incoming import (
 from firstfix.io.ros_messages.sensor_place import SensorPlace, place_of, unknown_place
 from firstfix.io.ros_messages.tf_tree import TransformTree
 
-# How long after the last wanted scan its transforms are still looked for: they arrive later than
-# the scan, and odometry is interpolated.
+# How long after the last scan transforms are still read: they arrive later than the scan, and
+# odometry is interpolated.
 AFTER_LAST_SCAN_NS = 2_000_000_000
 
 
@@ -44,7 +44,7 @@ class _Sweep(NamedTuple):
 
     @property
     def stamp(self) -> float:
-        """Seconds; a driver that does not stamp its scans sends zero."""
+        """Seconds; the time of recording if the driver sends no stamp."""
         return to_seconds(self.message.header.stamp) or 1e-9 * self.time_ns
 
 
@@ -54,29 +54,29 @@ def load_bag(
     """Read the scans of one topic, and the odometry, from a bag.
 
     The base is ``base_link``, else ``base_footprint``, else the frame that odometry moves,
-    whichever the sensor is fixed to by transforms that do not change (on ``/tf_static`` or, as
-    in ROS 1, repeated on ``/tf``). If it is fixed to none, the base is the sensor, odometry is
-    left out, and a note says so. Odometry is the transform from an odometry frame on ``/tf``,
-    else ``nav_msgs/Odometry``. Poses that a localizer published are not taken for the truth.
+    the first of them to which constant transforms (on ``/tf_static`` or, as in ROS 1, repeated on
+    ``/tf``) connect the sensor. If there is none, the base is the sensor, odometry is omitted, and
+    a note says so. Odometry is the transform from an odometry frame on ``/tf``,
+    else ``nav_msgs/Odometry``. Poses that a localizer published are not used as ground truth.
 
     Parameters
     ----------
     path : str or Path
         A ``.bag``, ``.db3`` or ``.mcap`` file, or the folder of a ROS 2 bag.
     topic : str or None
-        Topic of the scans; None for the only one, or ``scan`` of several.
+        Topic of the scans; None for the only one, or ``scan`` if there are several.
     max_scans : int or None
         Only the first ones by stamp.
 
     Returns
     -------
     Recording
-        Without truth; what had to be assumed is in its notes.
+        Without truth; assumptions of the reader are in its notes.
 
     Raises
     ------
     ScanError
-        If the bag is damaged, the topic is not clear, or a scan is not one.
+        If the bag is damaged, the topic is not unique, or a scan is invalid.
     """
     path = Path(path)
     n_most = check_max_scans(max_scans)
@@ -117,7 +117,7 @@ def _scan_topic(bag: BagFile, topic: str | None) -> str:
 
 def _no_scan(topic: str) -> ScanError:
     return ScanError(
-        expected=f"scans on {topic}, as the index of the bag says",
+        expected=f"scans on {topic}, as in the index of the bag",
         received="none",
         remedy="reindex the bag, or record it again",
     )
@@ -142,15 +142,15 @@ def _odometry(
     names = bag.topics_of(ODOMETRY)
     if odometry is not None or not names:
         return base, odometry, []
-    # Two filters on two topics may well write the same frames: their paths must not be mixed.
+    # Two filters on two topics may use the same frames: their trajectories must not be mixed.
     name = next((name for name in names if name.strip("/") == "odom"), names[0])
     messages = bag.messages(ODOMETRY, [name], until_ns=until_ns)
     tree.add_odometry(to_odometry(message) for _, message in messages)
     base = tree.base_of(frame)
     odometry = None if base is None else tree.odometry(base)
     if odometry is None:
-        return base, None, [f"{name} does not tell of a frame that the sensor is fixed to"]
-    return base, odometry, [f"odometry is from {name}, because no transform tells of it"]
+        return base, None, [f"{name} has no frame that is rigidly connected to the sensor"]
+    return base, odometry, [f"odometry is from {name}, because no transform contains it"]
 
 
 def _place(tree: TransformTree, base: str | None, frame: str, frames: list[str]) -> SensorPlace:

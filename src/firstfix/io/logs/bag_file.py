@@ -29,8 +29,8 @@ _OLD_NAMES = {"tf/msg/tfMessage": TRANSFORMS}
 class BagFile:
     """A bag that is open for reading; a context manager.
 
-    The messages wanted here have the same definition in every ROS, so the ones inside the bag,
-    which nobody vouches for, are not looked at.
+    These messages have the same definition in every ROS, so the definitions inside the bag, which
+    are not trusted, are not used.
 
     Parameters
     ----------
@@ -47,12 +47,12 @@ class BagFile:
         self._path = path
         self._is_ros1 = path.suffix.lower() == ".bag"
         self._connections: list[Connection] = []
-        with self._damage_told():
+        with self._damage_as_scan_error():
             self._reader = Reader1(path) if self._is_ros1 else Reader2(path)
             self._store = _ros1_types() if self._is_ros1 else _ros2_types()
 
     def __enter__(self) -> BagFile:
-        with self._damage_told():
+        with self._damage_as_scan_error():
             self._reader.open()
             self._connections = [c for c in self._reader.connections if c.msgcount]
             for connection in self._connections:
@@ -65,7 +65,7 @@ class BagFile:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        with self._damage_told():
+        with self._damage_as_scan_error():
             self._reader.close()
 
     def topics(self) -> list[tuple[str, str]]:
@@ -86,7 +86,7 @@ class BagFile:
         kind : str
             One of the types that this module names.
         topics : collection of str
-            Topics; messages of other types on them are left out.
+            Topics; messages of other types on them are skipped.
         until_ns : int or None
             Stop at this time of recording, ns.
 
@@ -102,10 +102,10 @@ class BagFile:
             return
         for connection in wanted:
             self._check_definition(connection)
-        with self._damage_told():
+        with self._damage_as_scan_error():
             stream = self._reader.messages(wanted, stop=until_ns)
         while True:
-            with self._damage_told():
+            with self._damage_as_scan_error():
                 item = next(stream, None)
                 if item is None:
                     return
@@ -133,18 +133,17 @@ class BagFile:
             )
 
     @contextmanager
-    def _damage_told(self) -> Iterator[None]:
+    def _damage_as_scan_error(self) -> Iterator[None]:
         try:
             yield
-        # A flipped byte makes rosbags and what it builds on (SQLite, LZ4, Zstandard, YAML,
-        # generated decoders) raise nearly anything, differently from version to version.
-        # Nothing but their code runs in here.
+        # After a flipped byte, rosbags and its libraries (SQLite, LZ4, Zstandard, YAML, generated
+        # decoders) raise nearly anything, depending on the version. Only their code runs here.
         except Exception as error:
             raise unreadable(self._path, "a ROS bag", error) from error
 
 
 def _check_names(connection: Connection) -> None:
-    # SQLite stores whatever was written: a damaged name can be a number, or nothing.
+    # SQLite does not check types: a damaged name can be a number or NULL.
     if not (isinstance(connection.topic, str) and isinstance(connection.msgtype, str)):
         raise TypeError(f"a topic {connection.topic!r} of the type {connection.msgtype!r}")
 

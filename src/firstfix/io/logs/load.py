@@ -1,4 +1,4 @@
-"""The front door for recordings: one function for every kind of file."""
+"""One function for recordings in every format."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CARMEN_SUFFIXES = (".log", ".clf", ".carmen")
 def load_recording(
     path: str | Path, *, topic: str | None = None, max_scans: int | None = None
 ) -> Recording:
-    """Read a recording, whatever kind of file it is in.
+    """Read a recording in any supported format.
 
     Parameters
     ----------
@@ -30,13 +30,13 @@ def load_recording(
     Returns
     -------
     Recording
-        Scans, odometry and truth as far as the file has them; what had to be assumed is in its
+        Scans, and odometry and truth if the file has them; assumptions of the reader are in its
         notes.
 
     Raises
     ------
     ScanError
-        If the path leads to nothing that can be read.
+        If there is no readable recording at the path.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def load_recording(
     """
     path = Path(path)
     suffix = _suffix(path)
-    # Imported here because rosbags takes a tenth of a second, and each file needs one reader.
+    # Imported here because rosbags takes a tenth of a second.
     if suffix in BAG_SUFFIXES or suffix == "/":
         from firstfix.io.logs.bag import load_bag
 
@@ -67,7 +67,7 @@ def load_recording(
 
 
 def _suffix(path: Path) -> str:
-    """Return the suffix that decides, "/" for the folder of a bag."""
+    """Return the suffix that selects the reader, "/" for the folder of a bag."""
     if path.is_dir():
         return _check_bag_folder(path)
     if not path.exists():

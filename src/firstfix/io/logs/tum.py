@@ -22,29 +22,29 @@ from firstfix.io.atomic_files import check_is_file, replace_file, show, unreacha
 MAX_POSES = 5_000_000
 # Eight numbers of 17 digits are 200 characters; a float64 written out has up to 330.
 MAX_LINE_BYTES = 4096
-# A planar robot on a ramp, or a tracker that hangs a little askew; beyond, yaw means little.
+# A robot on a ramp, or a slightly tilted tracker; beyond, yaw has little meaning.
 MAX_TILT = math.radians(5.0)
-# Files with three decimals are within a thousandth of one; far from one, it is no quaternion.
+# Files with three decimals are within a thousandth of one.
 _NORM_ERROR = 0.1
 
 _HEADER = b"# timestamp tx ty tz qx qy qz qw\n"
 
 
 def save_trajectory(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
-    """Write a trajectory, all or nothing.
+    """Write a trajectory, completely or not at all.
 
     Parameters
     ----------
     trajectory : Trajectory
-        Poses over time. Every stamp and coordinate comes back to the last bit, yaw within rounding
-        and in (-π, π].
+        Poses over time. Stamps and coordinates are written exactly, yaw within rounding and in
+        (-π, π].
     path : path-like
-        Where to; an existing file is replaced.
+        An existing file is replaced.
 
     Raises
     ------
     InputError
-        If there is no pose, or the file cannot be written; an old file is then as it was.
+        If there is no pose, or the file cannot be written; an old file is then unchanged.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def save_trajectory(trajectory: Trajectory, path: str | os.PathLike[str]) -> Non
 
 
 def load_trajectory(path: str | os.PathLike[str]) -> Trajectory:
-    """Read a trajectory; height, and a tilt up to `MAX_TILT`, are left out.
+    """Read a trajectory; height, and a tilt up to `MAX_TILT`, are ignored.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def _lines(trajectory: Trajectory) -> Iterator[bytes]:
     yield _HEADER
     for stamp, pose in zip(trajectory.stamps, trajectory.poses, strict=True):
         x, y, yaw = pose.tolist()
-        # As many digits as tell this float64 from its neighbours, and the usual nine at least.
+        # The shortest digits that give this float64 back, but at least the usual nine.
         when = np.format_float_positional(stamp, min_digits=9)
         qz, qw = math.sin(yaw / 2.0), math.cos(yaw / 2.0)
         yield f"{when} {x!r} {y!r} 0.0 0.0 0.0 {qz!r} {qw!r}\n".encode()
