@@ -23,9 +23,9 @@ STAND_IN = Path(__file__).parent / "rclpy_stand_in"
 OURS = (
     "rclpy",
     *(f"rclpy.{path.stem}" for path in (STAND_IN / "rclpy").glob("*.py")),
-    *(f"firstfix.ros.ros2.{name}" for name in ("node", "transport", "types")),
+    *(f"firstfix.ros.ros2.{name}" for name in ("bond", "node", "transport", "types")),
 )
-ALL = ("nav2_msgs", "kobuki_ros_interfaces")
+ALL = ("bond", "nav2_msgs", "kobuki_ros_interfaces")
 # The wheels never turn: whoever changes the pose of the robot carries it.
 T_ODOM_BASE = SE2(5.0, 5.0, 1.0)
 # A kernel may have to be compiled first.

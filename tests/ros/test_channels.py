@@ -6,6 +6,7 @@ from firstfix.ros.channels import (
     AMCL_POSE,
     HYPOTHESES,
     INITIAL_POSE,
+    LOCALIZED,
     PARTICLE_POSES,
     PARTICLES,
     STATUS,
@@ -66,16 +67,17 @@ def test_one_name_has_one_type():
             *subscribed_topics(config).values(),
             *published_topics(config, particles),
             INITIAL_POSE,
+            LOCALIZED,
         }
         types = {(topic.name, topic.type_name) for topic in topics}
         assert len(types) == len({name for name, _ in types})
 
 
 @pytest.mark.parametrize("particles", [PARTICLES, PARTICLE_POSES])
-def test_each_mode_says_its_own(particles):
+def test_each_mode_publishes_its_own_topics(particles):
     bootstrap = published_topics(NodeConfig(mode=Mode.BOOTSTRAP), particles)
-    assert set(bootstrap) == {INITIAL_POSE, HYPOTHESES, STATUS}
+    assert set(bootstrap) == {INITIAL_POSE, HYPOTHESES, LOCALIZED, STATUS}
     full = published_topics(NodeConfig(mode=Mode.FULL), particles)
-    assert set(full) == {AMCL_POSE, TF, particles, HYPOTHESES, STATUS}
+    assert set(full) == {AMCL_POSE, TF, particles, HYPOTHESES, LOCALIZED, STATUS}
     silent = NodeConfig(mode=Mode.FULL, tf_broadcast=False)
     assert TF not in published_topics(silent, particles)

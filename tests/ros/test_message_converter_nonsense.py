@@ -16,6 +16,7 @@ from firstfix.core.se2 import SE2
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.states import State
 from firstfix.ros.channels import Channel
+from firstfix.ros.exact_stamps import ExactStamps
 from firstfix.ros.message_converter import MessageConverter
 from firstfix.ros.node_config import NodeConfig
 
@@ -87,7 +88,7 @@ class Pair:
     """What a node has, without its thread."""
 
     def __init__(self, cache):
-        self._converter = MessageConverter(NodeConfig(), lambda subject, text: None)
+        self._converter = MessageConverter(NodeConfig(), ExactStamps(), lambda subject, text: None)
         self.localizer = Localizer(cache_dir=cache)
 
     def take(self, heard, message):

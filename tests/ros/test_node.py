@@ -415,3 +415,15 @@ def test_a_map_that_cannot_be_searched_leaves_the_one_in_use(run, robot, recorde
 def test_settings_out_of_their_range_make_no_node():
     with pytest.raises(InputError):
         NodeConfig(status_rate=-1.0)
+
+
+def test_when_scans_stop_the_status_becomes_stale_once(run, robot, recorder):
+    running = run(mode=Mode.FULL, scan_timeout=0.2)
+    introduce(running, robot)
+    wait_for(lambda: [m for m in recorder.on(STATUS) if m.status[0].level == 3])
+    wait_for(lambda: running.state is State.LOCALIZED)
+    (warning,) = recorder.told(Severity.WARNING)
+    assert warning.startswith("STALE: no scan for ")
+    robot.move()
+    robot.report(running.receive)
+    wait_for(lambda: recorder.on(STATUS)[-1].status[0].level == 0)

@@ -18,12 +18,14 @@ from firstfix.ros.channels import (
     AMCL_POSE,
     HYPOTHESES,
     INITIAL_POSE,
+    LOCALIZED,
     PARTICLE_POSES,
     PARTICLES,
     STATUS,
     TF,
     published_topics,
 )
+from firstfix.ros.exact_stamps import ExactStamps
 from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.output_publisher import OutputPublisher
 from firstfix.ros.transport import Severity
@@ -63,7 +65,7 @@ def searching(stamp, reason="nothing fits", evidence=None):
 
 
 def announced(recorder, config, *batches, particles=None):
-    publisher = OutputPublisher(config, recorder)
+    publisher = OutputPublisher(config, ExactStamps(), recorder)
     for outputs in batches:
         publisher.publish(outputs, particles)
     return publisher
@@ -84,7 +86,7 @@ def test_bootstrap_hands_over_one_pose_and_nothing_else(recorder):
     assert to_planar(said).distance_to(HERE) < 1e-12
     covariance = np.reshape(message.pose.covariance, (6, 6))
     assert [covariance[i, i] for i in (0, 1, 5)] == [0.01, 0.04, 0.09]
-    assert {topic.name for topic, _ in recorder.published} == {"initialpose", "localization_status"}
+    assert {topic for topic, _ in recorder.published} == {INITIAL_POSE, LOCALIZED, STATUS}
 
 
 def test_full_follows_the_robot_itself(recorder):
@@ -173,7 +175,7 @@ def stamps_of(messages):
 
 
 def test_a_cloud_is_published_at_its_rate_and_only_where_it_is_heard(recorder):
-    publisher = OutputPublisher(NodeConfig(mode=Mode.FULL, cloud_rate=2.0), recorder)
+    publisher = OutputPublisher(NodeConfig(mode=Mode.FULL, cloud_rate=2.0), ExactStamps(), recorder)
     for i in range(10):
         recorder.listening[PARTICLES.name] = int(i >= 2)
         publisher.publish(tracked(10.0 + 0.2 * i), cloud())
@@ -261,7 +263,9 @@ def test_a_robot_that_is_not_found_is_a_warning_and_one_without_a_map_an_error(r
 
 
 def test_status_comes_at_its_rate_and_at_every_change(recorder):
-    publisher = OutputPublisher(NodeConfig(mode=Mode.FULL, status_rate=2.0), recorder)
+    publisher = OutputPublisher(
+        NodeConfig(mode=Mode.FULL, status_rate=2.0), ExactStamps(), recorder
+    )
     for i in range(11):
         publisher.publish(tracked(10.0 + 0.1 * i), None)
     assert stamps_of(recorder.on(STATUS)) == pytest.approx([10.0, 10.5, 11.0])
@@ -273,7 +277,7 @@ def test_status_comes_at_its_rate_and_at_every_change(recorder):
 
 
 def test_the_log_tells_of_changes_and_once_in_a_while_why_nothing_is_found(recorder):
-    publisher = OutputPublisher(FULL, recorder)
+    publisher = OutputPublisher(FULL, ExactStamps(), recorder)
     publisher.publish(searching(0.0, "a map came"), None)
     for i in range(1, 25):
         publisher.publish(searching(1000.0 + i, f"only {i}% fit"), None)
@@ -293,3 +297,44 @@ def test_numbers_that_are_none_break_nothing(recorder):
     evidence = Evidence(math.nan, math.nan, math.nan, math.nan, 0)
     announced(recorder, FULL, searching(1.0, "", evidence))
     assert status_values(recorder.on(STATUS)[0])["explained"] == "nan"
+
+
+# ---- exact stamps
+
+
+def test_answers_to_a_scan_have_its_stamp_to_the_nanosecond(recorder, ros2):
+    """At today's times a float of seconds is off by up to 120 ns."""
+    stamps = ExactStamps()
+    time = ros2.make("builtin_interfaces/Time", sec=1_764_000_000, nanosec=123_456_789)
+    seconds = stamps.add(time)
+    config = NodeConfig(mode=Mode.FULL, transform_tolerance=0.25)
+    recorder.listening = {PARTICLES.name: 1}
+    publisher = OutputPublisher(config, stamps, recorder)
+    publisher.publish([*several(seconds), *found(seconds)], cloud())
+    for topic in (AMCL_POSE, HYPOTHESES, PARTICLES, STATUS):
+        stamp = recorder.on(topic)[0].header.stamp
+        assert (stamp.sec, stamp.nanosec) == (1_764_000_000, 123_456_789), topic.name
+    ahead = recorder.on(TF)[0].transforms[0].header.stamp
+    assert (ahead.sec, ahead.nanosec) == (1_764_000_000, 373_456_789)
+
+
+# ---- stale
+
+
+def test_without_scans_the_status_is_stale_with_the_reason_and_the_robot_not_localized(recorder):
+    publisher = announced(recorder, FULL, found(10.0))
+    publisher.publish_stale(2.5)
+    publisher.publish_stale(5.0)  # once is enough
+    _, stale = recorder.on(STATUS)
+    assert stale.status[0].level == 3
+    assert stale.status[0].message == "STALE: no scan for 2.5 s; the state was LOCALIZED"
+    assert to_seconds(stale.header.stamp) == 12.5
+    assert [message.data for message in recorder.on(LOCALIZED)] == [True, False]
+    publisher.publish(tracked(12.6), None)
+    assert recorder.on(STATUS)[-1].status[0].level == 0
+    assert recorder.on(LOCALIZED)[-1].data is True
+
+
+def test_localized_is_published_when_it_changes(recorder):
+    announced(recorder, FULL, searching(1.0), searching(2.0), found(3.0), tracked(4.0))
+    assert [message.data for message in recorder.on(LOCALIZED)] == [False, True]

@@ -4,6 +4,11 @@ class FloatingPointRange:
 class IntegerRange:
     def __init__(self, *, from_value: int, to_value: int, step: int) -> None: ...
 
+class SetParametersResult:
+    successful: bool
+    reason: str
+    def __init__(self, *, successful: bool, reason: str = "") -> None: ...
+
 class ParameterDescriptor:
     floating_point_range: list[FloatingPointRange]
     integer_range: list[IntegerRange]

@@ -25,9 +25,10 @@ from firstfix.io.ros_messages.tf_buffer import LookupFailure
 from firstfix.io.saved_pose import map_key
 from firstfix.localizer.inputs import Input, NewMap, NoMotionUpdate, PoseHint, Reset
 from firstfix.ros.channels import Channel
+from firstfix.ros.exact_stamps import ExactStamps
 from firstfix.ros.node_config import NodeConfig
 
-# Odometry that lags behind the scans by more than this comes from another clock, s.
+# Odometry that stays behind the scans by more than this, for this time, has another clock, s.
 _LAG_S = 1.0
 # Scans that wait for the transform of a sensor that moves on its robot.
 _MAX_WAITING = 40
@@ -49,16 +50,22 @@ class MessageConverter:
     ----------
     config : NodeConfig
         Frames, and `first_map_only`.
+    stamps : ExactStamps
+        Collects the stamps of scans.
     warn : callable
         Takes a subject and one sentence for people; may be called as often as there is reason to.
     """
 
-    def __init__(self, config: NodeConfig, warn: Callable[[str, str], None]) -> None:
+    def __init__(
+        self, config: NodeConfig, stamps: ExactStamps, warn: Callable[[str, str], None]
+    ) -> None:
         self._config = config
+        self._stamps = stamps
         self._warn = warn
         self._frames = RobotFrames(config.odom_frame_id, config.base_frame_id)
         self._waiting: deque[Any] = deque(maxlen=_MAX_WAITING)
         self._dropped: Counter[str] = Counter()
+        self._lags_since: float | None = None
         self._pressed: set[tuple[Channel, int]] = set()
         self._map_key = self._map_key_before = ""
 
@@ -126,7 +133,7 @@ class MessageConverter:
         return Reset(self._now)
 
     def _convert_scan(self, message: Any) -> list[Input]:
-        stamp, frame = to_seconds(message.header.stamp), to_frame(message.header.frame_id)
+        stamp, frame = self._stamps.add(message.header.stamp), to_frame(message.header.frame_id)
         if stamp <= 0.0:
             return self._drop("a scan has no stamp: its driver must write one")
         if (back_s := self._frames.clock_step_at_scan(stamp)) > 0.0:
@@ -143,12 +150,23 @@ class MessageConverter:
                 if has_room:
                     return []
             return self._drop(f"the pose of the laser is unknown: {laser.why}")
-        if stamp - reach > _LAG_S:
-            lag = f"odometry is {stamp - reach:.1f} s behind the scans: do the clocks agree?"
-            self._warn("lag", lag)
+        self._check_lag(stamp, reach)
         scan = to_laser_scan(message, T_base_laser=laser.T_base_laser, mounting=laser.mounting)
-        # Where base and odometry are joined by fixed transforms, odometry is known at any time.
-        return [*(self._frames.odometry_at(stamp) if reach == math.inf else ()), scan]
+        # Where fixed transforms join odometry and base, odometry is known at any time.
+        is_fixed = reach == math.inf
+        odometry = self._frames.odometry_at if is_fixed else self._frames.extrapolated
+        return [*odometry(stamp), scan]
+
+    def _check_lag(self, stamp: float, reach: float) -> None:
+        """Warn of odometry that stays behind the scans; at the start it may just be late."""
+        lag_s = stamp - reach
+        if lag_s <= _LAG_S:
+            self._lags_since = None
+        elif self._lags_since is None or stamp < self._lags_since:
+            self._lags_since = stamp
+        elif stamp - self._lags_since >= _LAG_S:
+            lag = f"odometry is {lag_s:.1f} s behind the scans: do the clocks agree?"
+            self._warn("lag", lag)
 
     def _drop(self, why: str) -> list[Input]:
         subject = why.partition(":")[0]

@@ -20,6 +20,7 @@ from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Output
 from firstfix.localizer.precompile import precompile
 from firstfix.ros.channels import Channel, subscribed_topics
+from firstfix.ros.exact_stamps import ExactStamps
 from firstfix.ros.inbox import Inbox
 from firstfix.ros.message_converter import MessageConverter
 from firstfix.ros.node_config import NodeConfig
@@ -57,13 +58,15 @@ class Node:
         self._transport = transport
         self._watchers = watchers
         self._inbox: Inbox[tuple[Channel, Any]] = Inbox()
-        self._converter = MessageConverter(config, self.warn_throttled)
-        self._publisher = OutputPublisher(config, transport)
+        stamps = ExactStamps()
+        self._converter = MessageConverter(config, stamps, self.warn_throttled)
+        self._publisher = OutputPublisher(config, stamps, transport)
         self._memory = PoseMemory(config, transport.log)
         self._localizer = Localizer(config.localizer, cache_folder())
         self._map: NewMap | None = None  # of yaml_filename, then the one in use
         self._logged_at: dict[str, float] = {}
         self._received: set[Channel] = set()
+        self._scan_at = math.inf  # time of the last scan; infinite before the first and once stale
         self.expects_topics_since = math.inf  # infinite while the transport passes nothing on
         self._worker = threading.Thread(target=self._work, name="firstfix", daemon=True)
 
@@ -128,10 +131,15 @@ class Node:
     def _work(self) -> None:
         self._try(self._prepare)
         while not self._inbox.is_closed:
-            self._take_all(self._inbox.take(_SILENCE_S))
+            self._take_all(
+                self._inbox.take(min(_SILENCE_S, self._config.scan_timeout or _SILENCE_S))
+            )
+            self._check_scans()
             if time.monotonic() - self.expects_topics_since >= _SILENCE_S:
                 self._report_silent_topics()
         self._try(self._memory.close)
+        # The arrays must not wait for the collector of reference cycles.
+        del self._localizer, self._converter
 
     def _prepare(self) -> None:
         precompile(self._config.localizer.amcl)
@@ -142,7 +150,9 @@ class Node:
         for channel, message in items:
             if self._inbox.is_closed:
                 return
-            self._received.add(Channel.SCAN if isinstance(message, LaserScan) else channel)
+            is_scan = channel is Channel.SCAN or isinstance(message, LaserScan)
+            self._scan_at = time.monotonic() if is_scan else self._scan_at
+            self._received.add(Channel.SCAN if is_scan else channel)
             self._try(self._take, channel, message)
 
     def _take(self, channel: Channel, message: Any) -> None:
@@ -199,6 +209,13 @@ class Node:
         except Exception:  # noqa: BLE001 - a worker that ends silently would be worse
             text = f"an error of firstfix itself:\n{traceback.format_exc()}"
             self.warn_throttled("error", text, Severity.ERROR)
+
+    def _check_scans(self) -> None:
+        """Publish once that the status is stale when scans stop."""
+        silence_s = time.monotonic() - self._scan_at
+        if 0.0 < self._config.scan_timeout < silence_s:
+            self._scan_at = math.inf
+            self._try(self._publisher.publish_stale, silence_s)
 
     def _report_silent_topics(self) -> None:
         """Name the topics without a message since the last report."""

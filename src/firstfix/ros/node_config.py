@@ -59,6 +59,9 @@ class NodeConfig:
     status_rate: float = setting(
         2.0, "maximum rate of localization_status while the state stays the same, Hz", 0.1, 1e3
     )
+    scan_timeout: float = setting(
+        2.0, "time without a scan after which localization_status is stale, s; 0: never", 0.0
+    )
     localizer: LocalizerConfig = field(default_factory=LocalizerConfig)
 
     def __post_init__(self) -> None:

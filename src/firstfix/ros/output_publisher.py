@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 from typing import Any
 
 from firstfix.amcl.particles import Particles
@@ -26,7 +27,8 @@ from firstfix.localizer.outputs import (
     TrackedPose,
 )
 from firstfix.localizer.states import State
-from firstfix.ros.channels import AMCL_POSE, HYPOTHESES, INITIAL_POSE, STATUS, TF
+from firstfix.ros.channels import AMCL_POSE, HYPOTHESES, INITIAL_POSE, LOCALIZED, STATUS, TF
+from firstfix.ros.exact_stamps import ExactStamps
 from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.transport import Severity, Transport
 
@@ -52,15 +54,19 @@ class OutputPublisher:
     ----------
     config : NodeConfig
         Mode, frames, rates.
+    stamps : ExactStamps
+        The exact stamps of recent scans.
     transport : Transport
         Makes and sends the messages.
     """
 
-    def __init__(self, config: NodeConfig, transport: Transport) -> None:
+    def __init__(self, config: NodeConfig, stamps: ExactStamps, transport: Transport) -> None:
         self._config = config
+        self._stamps = stamps
         self._transport = transport
         self._map = config.global_frame_id
-        self._state: State | None = None
+        self._status: Status | None = None
+        self._is_localized: bool | None = None
         self._status_at = -math.inf
         self._logged_at = -math.inf
         self._cloud_at = -math.inf
@@ -105,8 +111,8 @@ class OutputPublisher:
         self._transport.publish(INITIAL_POSE, message)
 
     def _pose_message(self, at: InitialPose | TrackedPose) -> Any:
-        make = self._transport.make
-        return pose_with_covariance(make, at.stamp, self._map, at.T_map_base, at.covariance)
+        make, stamp = self._transport.make, self._stamps.exact(at.stamp)
+        return pose_with_covariance(make, stamp, self._map, at.T_map_base, at.covariance)
 
     def _publish_tracked(self, tracked: TrackedPose, particles: Particles | None) -> None:
         if self._config.mode is Mode.BOOTSTRAP:
@@ -121,7 +127,7 @@ class OutputPublisher:
         self._transport.publish(AMCL_POSE, self._pose_message(tracked))
         if config.tf_broadcast:
             # Stamped ahead, as in AMCL, so that it is valid until the next one.
-            until = stamp + config.transform_tolerance
+            until = self._stamps.exact(stamp, config.transform_tolerance)
             T = tracked.T_map_odom
             self._transport.publish(TF, transforms(make, until, self._map, config.odom_frame_id, T))
         if particles is not None:
@@ -133,23 +139,24 @@ class OutputPublisher:
         if not is_due or not self._transport.subscriber_count(topic):
             return
         self._cloud_at = stamp
-        make, poses = self._transport.make, particles.poses()
+        make, exact, poses = self._transport.make, self._stamps.exact(stamp), particles.poses()
         if topic.type_name == "geometry_msgs/PoseArray":
-            cloud = pose_array(make, stamp, self._map, map(SE2.from_array, poses))
+            cloud = pose_array(make, exact, self._map, map(SE2.from_array, poses))
         else:
-            cloud = particle_cloud(make, stamp, self._map, poses, particles.weight)
+            cloud = particle_cloud(make, exact, self._map, poses, particles.weight)
         self._transport.publish(topic, cloud)
 
     def _publish_places(self, stamp: float, poses: list[SE2]) -> None:
         self._places = len(poses)
-        message = pose_array(self._transport.make, stamp, self._map, poses)
+        exact = self._stamps.exact(stamp)
+        message = pose_array(self._transport.make, exact, self._map, poses)
         self._transport.publish(HYPOTHESES, message)
 
     def _publish_status(self, status: Status) -> None:
         if self._places and status.state is not State.DISAMBIGUATING:
             self._publish_places(status.stamp, [])  # one place is left, or none
             self._motion = None
-        has_changed = status.state is not self._state
+        has_changed = self._status is None or status.state is not self._status.state
         is_lost = status.state in (State.SEARCHING, State.DISAMBIGUATING)
         if has_changed or (is_lost and _is_due(status.stamp, self._logged_at, _REMIND_S)):
             self._logged_at = status.stamp
@@ -157,16 +164,32 @@ class OutputPublisher:
         is_due = _is_due(status.stamp, self._status_at, 1.0 / self._config.status_rate)
         if not has_changed and not is_due:
             return
-        self._state, self._status_at = status.state, status.stamp
-        message = diagnostics(
-            self._transport.make,
-            status.stamp,
-            "firstfix: localization",
-            _LEVELS[status.state],
-            f"{status.state.value}: {status.reason}",
-            self._values(status),
-        )
-        self._transport.publish(STATUS, message)
+        self._status, self._status_at = status, status.stamp
+        text = f"{status.state.value}: {status.reason}"
+        self._send_status(status, _LEVELS[status.state], text)
+        self._send_localized(is_localized=status.state is State.LOCALIZED)
+
+    def publish_stale(self, silence_s: float) -> None:
+        """Publish that the last status is stale, because no scan has come for a time (s)."""
+        if self._status is None:
+            return
+        text = f"STALE: no scan for {silence_s:.1f} s; the state was {self._status.state.value}"
+        later = replace(self._status, stamp=self._status.stamp + silence_s)
+        self._transport.log(Severity.WARNING, text)
+        self._send_status(later, Level.STALE, text)
+        self._send_localized(is_localized=False)
+        self._status = None  # the next one is published, whatever its state
+
+    def _send_status(self, status: Status, level: Level, text: str) -> None:
+        make, stamp = self._transport.make, self._stamps.exact(status.stamp)
+        name, values = "firstfix: localization", self._values(status)
+        self._transport.publish(STATUS, diagnostics(make, stamp, name, level, text, values))
+
+    def _send_localized(self, *, is_localized: bool) -> None:
+        if is_localized is not self._is_localized:
+            self._is_localized = is_localized
+            message = self._transport.make("std_msgs/Bool", data=is_localized)
+            self._transport.publish(LOCALIZED, message)
 
     def _values(self, status: Status) -> dict[str, str]:
         values = {"state": status.state.value, "mode": self._config.mode.value}

@@ -238,6 +238,69 @@ def test_the_topic_tells_of_a_clock_set_back_too(frames):
     assert told(frames) == [(40.0, 40.0)]
 
 
+def test_a_source_that_takes_over_is_not_compared_with_the_one_before(frames):
+    for i in range(101):
+        assert frames.add_odometry(driven(0.02 * i)) == 0.0
+        frames.new_odometry()
+    for i in range(100):
+        assert frames.add_moving([driven(0.02 * i)]) == 0.0
+        assert told(frames) == []
+    assert frames.add_moving([driven(2.02)]) == 0.0
+    assert told(frames) == [(2.02, 2.02)]
+
+
+# ---- extrapolation
+
+
+def extrapolated(frames, stamp):
+    return [(each.stamp, each.T_odom_base.x) for each in frames.extrapolated(stamp)]
+
+
+def test_odometry_is_extrapolated_by_one_period_at_its_last_velocity(frames):
+    frames.add_moving([driven(1.0)])
+    frames.new_odometry()
+    assert extrapolated(frames, 1.01) == []  # no velocity yet
+    frames.add_moving([driven(1.025)])
+    frames.new_odometry()
+    assert extrapolated(frames, 1.0251 + 0.025) == []
+    assert extrapolated(frames, 1.025) == []
+    assert extrapolated(frames, 1.045) == [(1.045, pytest.approx(1.045))]
+    assert frames.known_until == 1.045
+
+
+def test_slow_odometry_is_extrapolated_by_a_twentieth_of_a_second_at_most(frames):
+    for stamp in (1.0, 2.0):
+        frames.add_moving([driven(stamp)])
+        frames.new_odometry()
+    assert extrapolated(frames, 2.06) == []
+    assert extrapolated(frames, 2.05) == [(2.05, pytest.approx(2.05))]
+
+
+def test_measured_odometry_replaces_what_was_extrapolated(frames):
+    for stamp in (1.0, 1.025):
+        frames.add_moving([driven(stamp)])
+        frames.new_odometry()
+    frames.extrapolated(1.05)
+    frames.add_moving([link("odom", "base", 1.05, x=1.3)])
+    assert told(frames) == [(1.05, 1.3)]
+    frames.extrapolated(1.06)
+    frames.add_moving([link("odom", "base", 1.055, x=1.4)])
+    assert told(frames) == []  # odometry never goes back
+    frames.add_moving([driven(1.08)])
+    assert told(frames) == [(1.08, 1.08)]
+
+
+def test_a_turning_robot_is_extrapolated_in_its_own_frame(frames):
+    quarter = (0.0, 0.0, math.sin(math.pi / 4), math.cos(math.pi / 4))
+    frames.add_moving([link("odom", "base", 1.0, q=quarter)])
+    frames.new_odometry()
+    moved = link("odom", "base", 1.04, q=quarter)._replace(translation=(0.0, 0.4, 0.0))
+    frames.add_moving([moved])
+    frames.new_odometry()
+    (odometry,) = frames.extrapolated(1.06)
+    assert (odometry.T_odom_base.x, odometry.T_odom_base.y) == pytest.approx((0.0, 0.6))
+
+
 # ---- the sensor
 
 

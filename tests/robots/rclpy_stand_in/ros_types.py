@@ -25,9 +25,13 @@ NAV2 = {
     "Particle": "geometry_msgs/Pose pose\nfloat64 weight",
     "ParticleCloud": "std_msgs/Header header\nParticle[] particles",
 }
+BOND = {
+    "Status": "std_msgs/Header header\nstring id\nstring instance_id\nbool active\n"
+    "float32 heartbeat_timeout\nfloat32 heartbeat_period"
+}
 PACKAGES = ("builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "nav_msgs", "rcl_interfaces")
 PACKAGES += ("sensor_msgs", "std_msgs", "std_srvs", "tf2_msgs")
-OPTIONAL = {"kobuki_ros_interfaces": KOBUKI, "nav2_msgs": NAV2}
+OPTIONAL = {"bond": BOND, "kobuki_ros_interfaces": KOBUKI, "nav2_msgs": NAV2}
 
 TYPECODES = {"float32": "f", "float64": "d", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H"}
 TYPECODES |= {"int32": "i", "uint32": "I", "int64": "q", "uint64": "Q"}

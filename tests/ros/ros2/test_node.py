@@ -1,8 +1,11 @@
 """The life of the node, over a stand-in for rclpy: see its docstring for what that proves."""
 
+import gc
 import math
+import signal
 import sys
 import threading
+import weakref
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -273,3 +276,116 @@ def test_run_refuses_what_ros_would_pass_over(lab: Lab, given: list[str]) -> Non
     with pytest.raises(InputError, match="--ros-args"):
         lab.ros2.run(given)
     assert not lab.rclpy.ok()
+
+
+# ---- parameters while it runs
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("mode", "nonsense", "mode as one of bootstrap, full"),
+        ("max_beams", "many", "max_beams"),
+        ("min_particles", 5000, "min_particles up to max_particles"),
+        ("recovery_alpha_fast", 0.1, "searching the whole map"),
+    ],
+)
+def test_a_bad_value_is_refused_with_the_reason(lab: Lab, name: str, value, words: str) -> None:
+    node = lab.node()
+    before = node.get_parameter(name).value
+    result = node.set_parameter(name, value)
+    assert not result.successful
+    assert words in result.reason
+    assert "\n" not in result.reason
+    assert node.get_parameter(name).value == before
+
+
+def test_good_values_and_those_of_ros_are_accepted(lab: Lab) -> None:
+    node = lab.node()
+    for name, value in (("mode", "full"), ("use_sim_time", True), ("autostart", True)):
+        assert node.set_parameter(name, value).successful
+        assert node.get_parameter(name).value == value
+
+
+# ---- bond
+
+
+def test_an_active_node_sends_heartbeats_to_the_lifecycle_manager(lab: Lab) -> None:
+    node = lab.node()
+    beats = lab.hears("bond", "bond/Status")
+    node.trigger_configure()
+    assert not lab.world.timers
+    node.trigger_activate()
+    for beat in [*lab.world.timers] * 3:
+        beat()
+    assert [beat.active for beat in beats] == [True] * 4
+    assert {beat.id for beat in beats} == {"firstfix"}
+    assert len({beat.instance_id for beat in beats}) == 1
+    assert (beats[0].heartbeat_timeout, beats[0].heartbeat_period) == (4.0, 0.1)
+    node.trigger_deactivate()
+    assert beats[-1].active is False
+    assert not lab.world.timers
+    node.trigger_activate()
+    assert beats[-1].instance_id != beats[0].instance_id
+
+
+def test_a_bond_timeout_of_zero_means_no_bond(lab: Lab) -> None:
+    node = lab.node("-p", "bond_timeout:=0.0")
+    beats = lab.hears("bond", "bond/Status")
+    assert succeeds(lab, node.trigger_configure(), node.trigger_activate())
+    assert not beats
+    assert not lab.world.timers
+
+
+def test_a_bad_bond_timeout_is_told_in_one_line(lab: Lab) -> None:
+    node = lab.node("-p", "bond_timeout:=-1.0")
+    assert node.trigger_configure() is lab.lifecycle.TransitionCallbackReturn.FAILURE
+    assert "bond_timeout in seconds" in lab.world.lines("error")[0]
+
+
+# ---- memory
+
+
+def test_what_is_cleaned_up_is_freed(lab: Lab, hall_plan: OccupancyGrid) -> None:
+    """Without waiting for the collector of cycles, which arrays of 25 MB do not trigger."""
+    node = lab.node("-p", "mode:=full")
+    robot = Robot(lab, hall_plan, HERE)
+    poses = lab.hears("amcl_pose", POSE, is_latched=True)
+    assert succeeds(lab, node.trigger_configure(), node.trigger_activate())
+    robot.look_until(lambda: poses)
+    transport = node._transport
+    kept = [weakref.ref(each) for each in (transport, transport._node, transport._node._localizer)]
+    del transport
+    gc.collect()
+    gc.disable()
+    try:
+        assert succeeds(lab, node.trigger_deactivate(), node.trigger_cleanup())
+        assert [reference() for reference in kept] == [None] * 3
+    finally:
+        gc.enable()
+
+
+# ---- the end
+
+
+def test_ctrl_c_twice_during_a_conversion_ends_it_cleanly(lab: Lab) -> None:
+    def during_spin(node) -> None:
+        assert node.trigger_configure() is lab.lifecycle.TransitionCallbackReturn.SUCCESS
+        node.destroy_node = lambda: signal.raise_signal(signal.SIGINT)
+        lab.rclpy.try_shutdown()  # as rclpy's own handler does
+        signal.raise_signal(signal.SIGINT)
+        raise RuntimeError("Unable to convert call argument '0' to Python object")
+
+    lab.world.during_spin = during_spin
+    before = signal.getsignal(signal.SIGINT)
+    lab.ros2.run([])
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_an_error_while_ros_is_up_is_not_hidden(lab: Lab) -> None:
+    def during_spin(node) -> None:
+        raise RuntimeError("Unable to convert call argument '0' to Python object")
+
+    lab.world.during_spin = during_spin
+    with pytest.raises(RuntimeError, match="Unable"):
+        lab.ros2.run([])

@@ -67,6 +67,14 @@ def to_seconds(stamp: Any) -> float:
         return float(stamp.secs + 1e-9 * stamp.nsecs)
 
 
+def to_nanoseconds(stamp: Any) -> int:
+    """Read a time as nanoseconds, exactly; see `to_seconds`."""
+    try:
+        return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+    except AttributeError:
+        return int(stamp.secs) * 1_000_000_000 + int(stamp.nsecs)
+
+
 def to_frame(name: str) -> str:
     """Return the name of a frame as tf2 writes it: old ROS 1 nodes put a slash before it."""
     return name.removeprefix("/")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
@@ -32,17 +33,25 @@ class Level(IntEnum):
     OK = 0
     WARN = 1
     ERROR = 2
+    STALE = 3
 
 
-def header(make: Make, stamp: float, frame: str) -> Any:
+@dataclass(frozen=True, slots=True)
+class ExactTime:
+    """Nanoseconds since the epoch, where float seconds would lose some."""
+
+    nanoseconds: int
+
+
+def header(make: Make, stamp: float | ExactTime, frame: str) -> Any:
     """Build a ``std_msgs/Header``.
 
     Parameters
     ----------
     make : Make
         Of the transport.
-    stamp : float
-        Time, s; one before the epoch becomes 0, which the messages cannot go below.
+    stamp : float or ExactTime
+        Time, s or exact; a time before the epoch becomes 0, the least that messages can hold.
     frame : str
         ``frame_id``.
 
@@ -51,12 +60,15 @@ def header(make: Make, stamp: float, frame: str) -> Any:
     message
         The header.
     """
-    # The parts one by one: a product of 1e18 has lost 100 ns, and a stamp that is sent and heard
-    # would be another one.
-    whole = math.floor(stamp)
-    ns = max(0, whole * _NS + round((stamp - whole) * _NS))
+    ns = max(0, stamp.nanoseconds if isinstance(stamp, ExactTime) else _nanoseconds(stamp))
     time = make("builtin_interfaces/Time", sec=ns // _NS, nanosec=ns % _NS)
     return make("std_msgs/Header", stamp=time, frame_id=frame)
+
+
+def _nanoseconds(seconds: float) -> int:
+    # The parts one by one: a product of 1e18 has lost 100 ns.
+    whole = math.floor(seconds)
+    return whole * _NS + round((seconds - whole) * _NS)
 
 
 def pose(make: Make, T: SE2) -> Any:
@@ -69,7 +81,11 @@ def pose(make: Make, T: SE2) -> Any:
 
 
 def pose_with_covariance(
-    make: Make, stamp: float, frame: str, T_map_base: SE2, covariance: NDArray[np.float64]
+    make: Make,
+    stamp: float | ExactTime,
+    frame: str,
+    T_map_base: SE2,
+    covariance: NDArray[np.float64],
 ) -> Any:
     """Build a ``geometry_msgs/PoseWithCovarianceStamped``.
 
@@ -77,8 +93,8 @@ def pose_with_covariance(
     ----------
     make : Make
         Of the transport.
-    stamp : float
-        Time, s.
+    stamp : float or ExactTime
+        Time, s or exact.
     frame : str
         Frame of the map.
     T_map_base : SE2
@@ -101,14 +117,18 @@ def pose_with_covariance(
     )
 
 
-def pose_array(make: Make, stamp: float, frame: str, poses: Iterable[SE2]) -> Any:
+def pose_array(make: Make, stamp: float | ExactTime, frame: str, poses: Iterable[SE2]) -> Any:
     """Build a ``geometry_msgs/PoseArray`` of poses in a frame."""
     listed = [pose(make, T) for T in poses]
     return make("geometry_msgs/PoseArray", header=header(make, stamp, frame), poses=listed)
 
 
 def particle_cloud(
-    make: Make, stamp: float, frame: str, poses: NDArray[np.float64], weights: NDArray[np.float64]
+    make: Make,
+    stamp: float | ExactTime,
+    frame: str,
+    poses: NDArray[np.float64],
+    weights: NDArray[np.float64],
 ) -> Any:
     """Build a ``nav2_msgs/ParticleCloud``.
 
@@ -116,8 +136,8 @@ def particle_cloud(
     ----------
     make : Make
         Of the transport.
-    stamp : float
-        Time, s.
+    stamp : float or ExactTime
+        Time, s or exact.
     frame : str
         Frame of the map.
     poses : ndarray, shape (n, 3)
@@ -137,7 +157,9 @@ def particle_cloud(
     return make("nav2_msgs/ParticleCloud", header=header(make, stamp, frame), particles=particles)
 
 
-def transforms(make: Make, stamp: float, parent: str, child: str, T_parent_child: SE2) -> Any:
+def transforms(
+    make: Make, stamp: float | ExactTime, parent: str, child: str, T_parent_child: SE2
+) -> Any:
     """Build a ``tf2_msgs/TFMessage`` of one transform."""
     T = T_parent_child
     stamped = make(
@@ -154,7 +176,12 @@ def transforms(make: Make, stamp: float, parent: str, child: str, T_parent_child
 
 
 def diagnostics(
-    make: Make, stamp: float, name: str, level: Level, message: str, values: Mapping[str, str]
+    make: Make,
+    stamp: float | ExactTime,
+    name: str,
+    level: Level,
+    message: str,
+    values: Mapping[str, str],
 ) -> Any:
     """Build a ``diagnostic_msgs/DiagnosticArray`` of one status.
 
@@ -162,8 +189,8 @@ def diagnostics(
     ----------
     make : Make
         Of the transport.
-    stamp : float
-        Time, s.
+    stamp : float or ExactTime
+        Time, s or exact.
     name : str
         What the status is of.
     level : Level

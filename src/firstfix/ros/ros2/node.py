@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+import signal
 import traceback
+from typing import Any
 
 import rclpy
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.exceptions import InvalidParameterValueException, NameValidationException
 from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -17,7 +20,15 @@ from firstfix.ros.parameters import Parameter, configured, parameters
 from firstfix.ros.ros2.transport import Ros2
 from firstfix.ros.ros2.types import described
 
-AUTOSTART = "autostart"
+AUTOSTART, BOND_TIMEOUT = "autostart", "bond_timeout"
+# Default and meaning of the parameters that only this transport has.
+RCLPY_PARAMETERS: dict[str, tuple[bool | float, str]] = {
+    AUTOSTART: (False, "configure and activate at the start, without a lifecycle manager"),
+    BOND_TIMEOUT: (
+        4.0,
+        "silence after which the lifecycle manager treats the node as dead, s; 0: no bond",
+    ),
+}
 
 
 class Ros2Node(LifecycleNode):
@@ -35,17 +46,17 @@ class Ros2Node(LifecycleNode):
         self._transport: Ros2 | None = None
         for parameter in parameters():
             self._declare(parameter)
-        text = "configure and activate at the start, without a lifecycle manager"
-        alone = ParameterDescriptor(description=text, dynamic_typing=True)
-        self.declare_parameter(name=AUTOSTART, value=False, descriptor=alone)
+        for name, (default, text) in RCLPY_PARAMETERS.items():
+            alone = ParameterDescriptor(description=text, dynamic_typing=True)
+            self.declare_parameter(name=name, value=default, descriptor=alone)
+        self.add_on_set_parameters_callback(self._check_parameters)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Read the parameters, advertise and subscribe; start to prepare kernels and map."""
         try:
             self._warn_of_unknown()
-            names = [parameter.name for parameter in parameters()]
-            config = configured({name: self.get_parameter(name).value for name in names})
-            self._transport = Ros2(self, config)
+            config = configured(self._values())
+            self._transport = Ros2(self, config, self._bond_timeout())
             self._transport.start(self._make_node(config, self._transport))
         except (InputError, NameValidationException) as error:
             self.end()
@@ -90,6 +101,29 @@ class Ros2Node(LifecycleNode):
             self._transport.close()
         self._transport = None
 
+    def _values(self) -> dict[str, Any]:
+        return {each.name: self.get_parameter(each.name).value for each in parameters()}
+
+    def _bond_timeout(self) -> float:
+        value = self.get_parameter(BOND_TIMEOUT).value
+        if isinstance(value, (int, float)) and 0.0 <= value < math.inf:
+            return float(value)
+        raise InputError(
+            expected=f"{BOND_TIMEOUT} in seconds, 0 or more",
+            received=f"{value!r:.60}",
+            remedy="the default is 4.0; 0.0 means no bond",
+        )
+
+    def _check_parameters(self, changed: list[Any]) -> SetParametersResult:
+        """Refuse values that the next configure would refuse, with the reason."""
+        values = self._values()
+        new = {each.name: each.value for each in changed if each.name in values}
+        if (reason := _refusal(new)) is None and _refusal(values) is None:
+            reason = _refusal(values | new)  # such as min_particles above max_particles
+        if reason is not None:
+            return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)
+
     def _declare(self, parameter: Parameter) -> None:
         try:
             self.declare_parameter(parameter.name, parameter.default, described(parameter))
@@ -123,30 +157,51 @@ def run(arguments: list[str], make_node: MakeNode = Node) -> None:
     InputError
         If an argument is not one of ROS.
     """
-    _initialise(["firstfix", *arguments])
-    node = Ros2Node(make_node)
+    # rclpy shuts down on SIGINT by itself. Python's KeyboardInterrupt could strike anywhere: inside
+    # rclpy's conversion of a message, or in the cleanup at the second Ctrl-C.
+    before = signal.signal(signal.SIGINT, lambda *_: None)
+    try:
+        _initialise(["firstfix", *arguments])
+        _run(Ros2Node(make_node))
+    finally:
+        rclpy.try_shutdown()
+        signal.signal(signal.SIGINT, before)
+
+
+def _run(node: Ros2Node) -> None:
     try:
         is_alone = node.get_parameter(AUTOSTART).value is True
         if is_alone and node.trigger_configure() == TransitionCallbackReturn.SUCCESS:
             node.trigger_activate()
         while rclpy.ok():
             _spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass  # how rclpy tells that it is time to go
+    except ExternalShutdownException:
+        pass  # rclpy was shut down
     finally:
         node.end()
         node.destroy_node()
-        rclpy.try_shutdown()
 
 
 def _spin(node: Ros2Node) -> None:
     try:
         rclpy.spin(node)
     except RuntimeError as error:
-        # Asked for a transition that its state does not have, older rclpy ends (ros2/rclpy#1209).
+        if not rclpy.ok():
+            return  # the shutdown interrupted a call
+        # Older rclpy ends after a request for a transition that the state does not have
+        # (ros2/rclpy#1209).
         if "transition" not in str(error):
             raise
         node.get_logger().error(f"ignored: {error}")
+
+
+def _refusal(values: dict[str, Any]) -> str | None:
+    """Return why parameters cannot be used, in one line; None if they can."""
+    try:
+        configured(values)
+    except InputError as error:
+        return " ".join(str(error).split())
+    return None
 
 
 def _initialise(command: list[str]) -> None:

@@ -20,6 +20,7 @@ from firstfix.ros.channels import (
 )
 from firstfix.ros.node import Node
 from firstfix.ros.node_config import NodeConfig
+from firstfix.ros.ros2.bond import BOND, Bond
 from firstfix.ros.ros2.types import LATCHED, find, make, quality
 from firstfix.ros.transport import Severity
 
@@ -39,11 +40,16 @@ class Ros2:
         The node.
     config : NodeConfig
         The topics depend on the mode.
+    bond_timeout_s : float, optional
+        Silence after which the lifecycle manager treats the node as dead, s; 0: no bond.
     """
 
-    def __init__(self, owner: LifecycleNode, config: NodeConfig) -> None:
+    def __init__(
+        self, owner: LifecycleNode, config: NodeConfig, bond_timeout_s: float = 0.0
+    ) -> None:
         self._owner = owner
         self._config = config
+        self._bond_timeout_s = bond_timeout_s
         self._node: Node | None = None
         self._is_active = False
         self.particles = PARTICLES if find("msg", PARTICLES.type_name) else PARTICLE_POSES
@@ -54,6 +60,7 @@ class Ros2:
         }
         self._subscriptions: list[Any] = []
         self._services: list[Any] = []
+        self._bond: Bond | None = None
 
     def start(self, node: Node) -> None:
         """Start a node, subscribe to its topics and offer its services.
@@ -81,25 +88,31 @@ class Ros2:
         self._is_active = True
         if self._node is not None:
             self._node.expects_topics_since = time.monotonic()
+        if self._bond_timeout_s > 0.0 and (kind := self._find("msg", BOND, "bond")) is not None:
+            self._bond = Bond(self._owner, kind, self._bond_timeout_s)
 
     def deactivate(self) -> None:
         """Pass on latched messages only."""
         self._is_active = False
+        if self._bond is not None:
+            self._bond.close()
+            self._bond = None
         if self._node is not None:
             self._node.expects_topics_since = math.inf
 
     def close(self) -> None:
         """Stop the node, and destroy its topics and services."""
-        self._is_active = False
+        self.deactivate()
         if self._node is not None:
             self._node.stop()
+        self._node = None  # or node and transport would keep each other alive
         publishers, self._publishers = self._publishers, {}
         for publisher in publishers.values():
             self._owner.destroy_lifecycle_publisher(publisher)
-        for subscription in self._subscriptions:
-            self._owner.destroy_subscription(subscription)
-        for service in self._services:
-            self._owner.destroy_service(service)
+        while self._subscriptions:
+            self._owner.destroy_subscription(self._subscriptions.pop())
+        while self._services:
+            self._owner.destroy_service(self._services.pop())
 
     def make(self, type_name: str, /, **fields: Any) -> Any:
         """Build a message."""

@@ -56,13 +56,14 @@ class World:
     arguments: Arguments = field(default_factory=Arguments)
     ends: list[End] = field(default_factory=list)
     services: dict[str, tuple[Any, Callable[[Any, Any], Any]]] = field(default_factory=dict)
+    timers: list[Callable[[], None]] = field(default_factory=list)
     log: list[tuple[str, str]] = field(default_factory=list)
     during_spin: Callable[[Any], None] = lambda _: None
 
     def reset(self, arguments: Arguments) -> None:
         """Begin."""
         self.is_ok, self.arguments = True, arguments
-        self.ends, self.services, self.log = [], {}, []
+        self.ends, self.services, self.timers, self.log = [], {}, [], []
 
     def join(self, end: End) -> End:
         """Connect an end; a late subscription gets what is kept for it."""

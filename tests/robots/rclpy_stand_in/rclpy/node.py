@@ -7,7 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor
+from builtin_interfaces.msg import Time
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 
 from rclpy.exceptions import (
     InvalidParameterTypeException,
@@ -15,12 +16,21 @@ from rclpy.exceptions import (
     ParameterAlreadyDeclaredException,
 )
 from rclpy.graph import End, RCLError, world
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 
 @dataclass(frozen=True)
 class Parameter:
     name: str
     value: Any
+
+
+class Clock:
+    def now(self) -> Clock:
+        return self
+
+    def to_msg(self) -> Any:
+        return Time(sec=1, nanosec=0)
 
 
 class Logger:
@@ -56,6 +66,7 @@ class Node:
         self._logger = Logger()
         self._parameters: dict[str, Parameter] = {}
         self._descriptors: dict[str, Any] = {}
+        self._on_set_parameters: list[Any] = []
         given = world.arguments.parameters
         self._parameter_overrides = {name: Parameter(name, given[name]) for name in given}
         self.declare_parameter("use_sim_time", value=False)
@@ -75,9 +86,19 @@ class Node:
         self._descriptors[name] = descriptor
         return override
 
-    def set_parameter(self, name: str, value: Any) -> None:
-        """Do what ``ros2 param set`` does."""
-        self._keep(Parameter(name, value), self._descriptors[name])
+    def set_parameter(self, name: str, value: Any) -> Any:
+        """Do what ``ros2 param set`` does; return the result."""
+        parameter = Parameter(name, value)
+        for callback in self._on_set_parameters:
+            result = callback([parameter])
+            if not result.successful:
+                return result
+        self._keep(parameter, self._descriptors[name])
+        return SetParametersResult(successful=True)
+
+    def add_on_set_parameters_callback(self, callback: Any) -> None:
+        inspect.signature(callback).bind([])
+        self._on_set_parameters.append(callback)
 
     def describe_parameter(self, name: str) -> Any:
         return self._descriptors[name]
@@ -101,6 +122,35 @@ class Node:
             if not limits.from_value <= parameter.value <= limits.to_value:
                 raise InvalidParameterValueException(parameter.name)
         self._parameters[parameter.name] = parameter
+
+    def get_name(self) -> str:
+        return self.name
+
+    def get_clock(self) -> Clock:
+        return Clock()
+
+    def create_timer(self, timer_period_sec: float, callback: Any) -> Any:
+        assert timer_period_sec > 0.0
+        inspect.signature(callback).bind()
+        world.timers.append(callback)
+        return callback
+
+    def destroy_timer(self, timer: Any) -> bool:
+        world.timers.remove(timer)
+        return True
+
+    def create_publisher(self, msg_type: Any, topic: str, qos_profile: int) -> End:
+        assert isinstance(msg_type, type)
+        reliable = QoSProfile(
+            depth=qos_profile,
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.VOLATILE,
+        )
+        return world.join(End(msg_type, topic, reliable))
+
+    def destroy_publisher(self, publisher: End) -> bool:
+        world.leave(publisher)
+        return True
 
     def create_subscription(
         self, msg_type: Any, topic: str, callback: Any, qos_profile: Any

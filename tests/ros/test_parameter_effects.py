@@ -1,0 +1,213 @@
+"""Every documented parameter changes what a node does, or is refused with the reason."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from recorder import Recorder, Speaker
+
+from firstfix.core.errors import InputError
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.se2 import SE2
+from firstfix.io.maps.map_server import load_map, save_map
+from firstfix.lab.worlds.catalog import identical_rooms
+from firstfix.localizer.inputs import NewMap
+from firstfix.ros.channels import INITIAL_POSE, PARTICLES, Channel, subscribed_topics
+from firstfix.ros.node import Node
+from firstfix.ros.parameters import configured
+
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "settings.md"
+DOCUMENTED = re.findall(r"^\| `([\w.]+)` \|", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+
+BEAM = {"laser_model_type": "beam"}
+SKIP = {"laser_model_type": "likelihood_field_prob", "do_beamskip": True}
+START = {"set_initial_pose": True}
+
+# Of each parameter: a value other than the default, and the parameters that it depends on. The
+# robot drives in a hall; where "in" says so, in one of four equal rooms.
+EFFECTS: dict[str, dict[str, Any]] = {
+    "mode": {"to": "bootstrap"},
+    "yaml_filename": {"to": "map.yaml"},
+    "base_frame_id": {"to": "base_link"},
+    "odom_frame_id": {"to": "wheels"},
+    "global_frame_id": {"to": "floor"},
+    "scan_topic": {"to": "base_scan"},
+    "map_topic": {"to": "floor_plan"},
+    "first_map_only": {"to": True},
+    "set_initial_pose": {"to": True},
+    "initial_pose.x": {"to": 1.9, "with": START},
+    "initial_pose.y": {"to": 1.9, "with": START},
+    "initial_pose.yaw": {"to": 1.0, "with": START},
+    "always_reset_initial_pose": {"to": True, "with": START | {"initial_pose.x": 1.9}},
+    "saved_pose_file": {"to": "pose.json"},
+    "save_pose_rate": {"to": -1.0, "with": {"saved_pose_file": "pose.json"}},
+    "transform_tolerance": {"to": 0.2},
+    "tf_broadcast": {"to": False},
+    "cloud_rate": {"to": 50.0},
+    "status_rate": {"to": 50.0},
+    "scan_timeout": {"to": 60.0},
+    "alpha1": {"to": 2.0},
+    "alpha2": {"to": 2.0},
+    "alpha3": {"to": 2.0},
+    "alpha4": {"to": 2.0},
+    "alpha5": {"to": 2.0, "with": {"robot_model_type": "nav2_amcl::OmniMotionModel"}},
+    "robot_model_type": {"to": "nav2_amcl::OmniMotionModel"},
+    "laser_model_type": {"to": "beam"},
+    "max_beams": {"to": 20},
+    "laser_min_range": {"to": 2.0},
+    "laser_max_range": {"to": 3.0},
+    "laser_likelihood_max_dist": {"to": 0.2},
+    "z_hit": {"to": 0.9},
+    "z_short": {"to": 0.9, "with": BEAM},
+    "z_max": {"to": 0.9, "with": BEAM | {"laser_max_range": 3.0}},
+    "z_rand": {"to": 0.1},
+    "sigma_hit": {"to": 0.05},
+    "lambda_short": {"to": 5.0, "with": BEAM},
+    "do_beamskip": {"to": True, "with": {"laser_model_type": "likelihood_field_prob"}},
+    "beam_skip_distance": {"to": 0.05, "with": SKIP},
+    "beam_skip_threshold": {"to": 0.95, "with": SKIP},
+    "beam_skip_error_threshold": {"to": 0.01, "with": SKIP},
+    "model_unknown_space": {"to": True},
+    "min_particles": {"to": 1900},
+    "max_particles": {"to": 600},
+    "pf_err": {"to": 0.5, "with": {"min_particles": 10}},
+    "pf_z": {"to": 4.0, "with": {"min_particles": 10}},
+    "resample_interval": {"to": 3},
+    "selective_resampling": {"to": True},
+    "update_min_d": {"to": 2.0, "with": {"update_min_a": 3.0}},
+    "update_min_a": {"to": 2.0, "with": {"update_min_d": 3.0}},
+    "random_seed": {"to": 7},
+    "locate.max_poses": {"to": 1000},
+    "locate.shortlist": {"to": 1},
+    "locate.hypotheses": {"to": 2, "in": "rooms"},
+    "locate.unique_probability": {"to": 1.0},
+    "monitor.doubtful_cost": {"to": 0.01},
+    "monitor.contradiction_cost": {"to": 90.0},
+    "monitor.lost_after_s": {"to": 0.1, "with": {"monitor.search_period_s": 1000.0}},
+    "monitor.search_period_s": {"to": 1000.0},
+    "monitor.confirmations": {"to": 5},
+    "monitor.new_view_m": {"to": 50.0, "in": "rooms"},
+    "monitor.new_view_rad": {"to": 0.05, "in": "rooms"},
+    "monitor.rest_period_s": {"to": 0.05, "in": "rooms"},
+    "monitor.correct_m": {"to": 0.01},
+    "monitor.correct_rad": {"to": 0.003},
+    "monitor.decided_probability": {
+        "to": 1.0,
+        "in": "rooms",
+        "with": {"monitor.decided_views": 1},
+    },
+    "monitor.decided_cost": {"to": 0.002},
+    "monitor.decided_views": {"to": 1, "in": "rooms", "with": {"monitor.decided_probability": 0.5}},
+}
+REFUSED = {"recovery_alpha_slow": 0.1, "recovery_alpha_fast": 0.1}
+MOTION = SE2(0.3, 0.0, 0.1)
+
+
+class Drive:
+    """A map, a robot that drives, slips and is carried away, and at last another map."""
+
+    def __init__(self, wire: Any, world: OccupancyGrid, start: SE2, carried_to: SE2) -> None:
+        self.wire, self.world = wire, world
+        robot = Speaker(wire, world, start)
+        self.messages = [(Channel.TF_STATIC, robot.fixed()), (Channel.MAP, robot.map())]
+        for i in range(20):
+            if i in (8, 12):
+                robot.pose = robot.pose @ SE2(0.12, 0.1, 0.04) if i == 8 else carried_to
+            robot.report(lambda channel, message: self.messages.append((channel, message)))
+            robot.move(MOTION if i % 2 else SE2.identity(), 0.25)
+        robot.world = OccupancyGrid(world.cells[:-10].copy(), world.resolution, world.T_map_grid)
+        self.messages.append((Channel.MAP, robot.map()))
+
+    def outcome(self, folder: Path, parameters: dict[str, Any]) -> list[str]:
+        """Return all that a node with these parameters subscribes to, publishes, logs and saves."""
+        config = configured(parameters)
+        recorder = Recorder(self.wire)
+        recorder.listening = {PARTICLES.name: 1, INITIAL_POSE.name: 1}
+        node = Node(config, recorder)
+        if config.yaml_filename:
+            node._map = NewMap(0.0, load_map(folder / config.yaml_filename))
+        node._prepare()
+        for channel, message in self.messages:
+            node._take_all([(channel, message)])
+        node._scan_at -= 3.0  # s pass without a scan
+        node._check_scans()
+        node._memory.close()
+        topics = sorted(topic.name for topic in subscribed_topics(config).values())
+        return [*topics, *map(str, recorder.published), *map(str, recorder.lines)]
+
+
+@pytest.fixture(scope="module")
+def drives(ros2: Any, hall_plan: OccupancyGrid) -> dict[str, Drive]:
+    rooms = identical_rooms(4)
+    return {
+        "hall": Drive(ros2, hall_plan, SE2(3.0, 2.5, 0.4), SE2(7.5, 5.0, -1.5)),
+        "rooms": Drive(ros2, rooms, SE2(2.0, 2.0, 0.4), SE2(2.5, 2.5, 0.4)),
+    }
+
+
+@pytest.fixture(scope="module")
+def known() -> dict[Any, list[str]]:
+    """Give the outcomes so far: many parameters are compared with the same one."""
+    return {}
+
+
+@pytest.fixture
+def outcome(
+    drives: dict[str, Drive],
+    known: dict[Any, list[str]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Callable[[str, dict[str, Any]], list[str]]:
+    monkeypatch.setattr("firstfix.ros.node.precompile", lambda config: None)
+    monkeypatch.setattr(
+        "firstfix.ros.node.cache_folder", lambda: tmp_path_factory.getbasetemp() / "maps"
+    )
+    monkeypatch.chdir(tmp_path)
+    save_map(OccupancyGrid(np.eye(50, dtype=np.int8) * 100, 0.05), tmp_path / "map.yaml")
+
+    saved: list[str] = []
+    monkeypatch.setattr(
+        "firstfix.ros.pose_memory.save_pose", lambda path, pose: saved.append(f"{path} {pose}")
+    )
+
+    def outcome(world: str, parameters: dict[str, Any]) -> list[str]:
+        saved.clear()
+        key = world, *sorted(parameters.items())
+        if key not in known:
+            known[key] = drives[world].outcome(tmp_path, parameters) + saved
+        return known[key]
+
+    return outcome
+
+
+def test_every_documented_parameter_is_examined_here() -> None:
+    assert set(DOCUMENTED) == set(EFFECTS) | set(REFUSED)
+    assert not set(EFFECTS) & set(REFUSED)
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_parameter_without_effect_is_refused(name: str) -> None:
+    with pytest.raises(InputError, match=name):
+        configured({name: REFUSED[name]})
+
+
+def test_the_same_parameters_give_the_same_outcome(outcome: Any, known: Any) -> None:
+    before = outcome("rooms", {})
+    known.clear()
+    assert outcome("rooms", {}) == before
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EFFECTS)
+def test_a_parameter_has_an_effect(outcome: Any, name: str) -> None:
+    effect = EFFECTS[name]
+    world, others = effect.get("in", "hall"), effect.get("with", {})
+    # Clouds are large: only their own parameter needs them.
+    others = {"mode": "full", "cloud_rate": 2.0 if name == "cloud_rate" else 0.0} | others
+    assert outcome(world, others) != outcome(world, others | {name: effect["to"]})
