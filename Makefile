@@ -2,7 +2,10 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# The demo needs what a user installs; everything else also needs the developers' tools.
+USER_STAMP := $(VENV)/.installed-user
 STAMP := $(VENV)/.installed
+INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable
 # ROS 1 comes from the distribution's packages: where this Python has it, .venv sees it.
 VENV_ARGS ?= $(shell $(PYTHON) -c 'import rospy' 2>/dev/null && echo --system-site-packages)
 CASES ?= $(wildcard ../shared/cases/*/)
@@ -11,12 +14,17 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test check bench recording docs dist release-matrix lock clean
 
-$(STAMP): pyproject.toml
+# Python compiles what it imports, which is a small part of what pip would compile.
+$(USER_STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV_ARGS) $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(INSTALL) '.[plot]' --no-compile
 	touch $@
 
-demo: $(STAMP)
+$(STAMP): $(USER_STAMP)
+	$(INSTALL) '.[dev]'
+	touch $@
+
+demo: $(USER_STAMP)
 	$(BIN)/firstfix demo --headless $(DEMO_ARGS)
 
 test: $(STAMP)
@@ -42,7 +50,7 @@ docs: $(STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 $(VENV)/.release: $(STAMP)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[release]'
+	$(INSTALL) '.[release]'
 	touch $@
 
 dist: $(VENV)/.release

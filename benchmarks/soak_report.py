@@ -9,7 +9,7 @@ from typing import Any
 from soak_judged import RIGHT_DEG, RIGHT_M, STALE_S
 
 from firstfix.lab.experiments.machine import machine_text
-from firstfix.lab.reports.tables import columns_table, markdown_table
+from firstfix.lab.reports.text import columns_table, markdown_table
 from firstfix.plots.figure import BLUE, GREEN, ORANGE, RED, SKY, new_figure, save_figure
 
 Row = dict[str, Any]

@@ -36,7 +36,7 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.fields.map_fields import MapFields
 from firstfix.io.maps.map_server import load_map
 from firstfix.lab.experiments.machine import machine_text, this_machine
-from firstfix.lab.reports.tables import markdown_table
+from firstfix.lab.reports.text import markdown_table
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import random_free_pose
 from firstfix.lab.worlds.many_offices import many_offices

@@ -67,9 +67,7 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
             on_done(i, results[i])
         return results
 
-    # `apart` last: who is imported now must keep the true one for later.
-    for place in ("case_tasks", "track_bench", "process_pool"):
-        monkeypatch.setattr(f"firstfix.lab.experiments.{place}.run_in_processes", run)
+    monkeypatch.setattr("firstfix.lab.experiments.benchmark.run_in_processes", run)
 
 
 def write_case(folder: Path, grid: OccupancyGrid, poses: list[SE2], site: str) -> Path:

@@ -118,7 +118,7 @@ def test_a_world_that_is_none(cli) -> None:
 
 
 def test_cases_that_are_none(cli, tmp_path: Path) -> None:
-    assert_one_line(cli("bench", "nowhere"), "nowhere (there is none)")
+    assert_one_line(cli("bench", "nowhere"), "nowhere (no such folder)")
     assert_one_line(cli("bench", tmp_path), "a case")
 
 

@@ -9,7 +9,7 @@ import pytest
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.recording import Recording
 from firstfix.lab.experiments.case import Case
-from firstfix.lab.experiments.kidnap_runner import CaseTask, simulated, watched
+from firstfix.lab.experiments.kidnap_bench import KidnapCaseTask, localized, simulated
 from firstfix.lab.metrics.kidnap_trial import judge_trial
 from firstfix.lab.scenarios import kidnap_scripts
 from firstfix.lab.scenarios.kidnap_scripts import scripted
@@ -67,7 +67,7 @@ def test_what_happens_to_a_robot_reaches_the_judgement(
     hall_plan: OccupancyGrid, story: list[Phase]
 ) -> None:
     moments = run(Scenario(story), hall_plan, 1)
-    instants = list(watched(simulated(moments), hall_plan))
+    instants = list(localized(simulated(moments), hall_plan))
     trial = judge_trial(instants)
     assert [a.kind for a in trial.aftermaths] == ["carry", "slip", "teleport"]
     carry, _, teleport = trial.aftermaths
@@ -85,7 +85,7 @@ def test_a_spliced_drive_is_a_story_of_unsignalled_kidnaps(hall_plan: OccupancyG
     recording = record(run(Scenario([DriveTo(seconds=15.0), DriveTo()] * 4), hall_plan, 2))
     thin = Recording(recording.scans[::4], recording.odometry, _rows(recording.truth))
     case = Case("hall", "hall", "sim", lambda: hall_plan, lambda: thin)
-    played = CaseTask(case, (0,))()
+    played = KidnapCaseTask(case, (0,))()
     assert (played.name, played.left_out) == ("hall", None)
     (ran,) = played.runs
     assert (ran.kind, ran.seed) == ("splice", 0)

@@ -1,46 +1,13 @@
 """``firstfix bench --suite``."""
 
 import json
+from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from firstfix.cli.bench_scaling import bench_scaling
-from firstfix.core.grid import OccupancyGrid
-from firstfix.core.recording import Recording
-from firstfix.lab.experiments.paper_runner import (
-    PAPER_WORLDS,
-    at_home,
-    follow_with_system,
-    simulated_drive,
-)
-from firstfix.lab.experiments.starts import Start
-from firstfix.lab.metrics.outcome import is_found
-from firstfix.lab.simulation.floor import Floor
-
-
-def test_the_origin_of_every_world_is_a_place_where_a_robot_can_be() -> None:
-    for draw in PAPER_WORLDS.values():
-        assert Floor(at_home(draw())).room_at(0.0, 0.0) > 0.18
-
-
-def test_the_system_lives_through_a_drive(hall_plan: OccupancyGrid, driven: Recording) -> None:
-    lived = follow_with_system(driven, hall_plan)
-    assert lived.start is Start.SYSTEM
-    assert [belief.stamp for belief in lived.beliefs] == [scan.stamp for scan in driven.scans]
-    last = lived.beliefs[-1]
-    assert last.T_map_base is not None
-    assert is_found(last.T_map_base, last.truth)
-    assert len(lived.last_cloud) > 0
-
-
-def test_a_drive_is_as_long_as_asked_for_and_repeats(hall_plan: OccupancyGrid) -> None:
-    once, again = (simulated_drive(hall_plan, 3, 4.0) for _ in range(2))
-    assert len(once) == 40
-    assert once.truth is not None
-    assert again.truth is not None
-    np.testing.assert_array_equal(once.truth, again.truth)
+from firstfix.lab.experiments.scaling import scaling_tasks
+from firstfix.lab.metrics.paper_trial import Start
 
 
 @pytest.mark.slow
@@ -68,11 +35,14 @@ def test_steps_are_left_out_over_cases(cli, cases: Path, tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-def test_costs_of_one_office_are_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    json_file = tmp_path / "s.json"
-    bench_scaling(seed=0, json_file=json_file, report=tmp_path / "out", offices=(1,), beams=(100,))
-    assert "| paper " in capsys.readouterr().out
-    document = json.loads(json_file.read_text())
+def test_costs_of_one_office_are_measured(
+    cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one_office = partial(scaling_tasks, offices=(1,), beams=(100,))
+    monkeypatch.setattr("firstfix.lab.benchmarks.scaling_tasks", one_office)
+    ended = cli("bench", "--suite", "scaling", "--json", "s.json", "--report", "out")
+    assert "| paper " in ended.out
+    document = json.loads((tmp_path / "s.json").read_text())
     assert [row["beams"] for row in document["beams"]] == [100, 100]
     assert [row["threads"] for row in document["threads"]] == [1, 2]
     assert (tmp_path / "out" / "scaling.png").exists()

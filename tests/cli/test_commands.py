@@ -26,7 +26,7 @@ def test_help_names_every_command(cli) -> None:
     [
         (["locate"], "default: (0)"),
         (["bench"], "default: (fast)"),
-        (["map", "show"], "default: (firstfix-NAME.png here)"),
+        (["map", "show"], "default: (firstfix-NAME.png in this folder)"),
         (["map", "check"], "default: (40, none above 10 million cells)"),
     ],
 )
@@ -67,17 +67,6 @@ def test_bench_takes_single_cases_and_a_limit(cli, cases: Path, tmp_path: Path) 
     assert document["total"]["n"] == 1
     assert document["wrong_map"] == {"n": 0, "unique": 0}
     assert "no scan was tried on a wrong map" in ended.err
-
-
-def test_a_case_without_words_is_named_after_its_folder(cases: Path, tmp_path: Path) -> None:
-    from firstfix.cli.cases import find_cases
-
-    folder = tmp_path / "nameless"
-    folder.mkdir()
-    for name in ("map.yaml", "scans.npz"):
-        (folder / name).write_bytes((cases / "unique" / name).read_bytes())
-    (case,) = find_cases([folder])
-    assert (case.name, case.site, case.kind) == ("nameless", "nameless", "unknown")
 
 
 def test_map_check_says_what_is_in_a_map(cli, unique: Files) -> None:
@@ -121,8 +110,8 @@ def test_map_check_names_the_places_that_look_alike(cli, alike: Files) -> None:
 def test_map_check_asks_before_it_works_long(
     cli, unique: Files, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("firstfix.cli.map_aliasing.MOST_CELLS", 1000)
-    assert "ask for it with --samples 40" in cli("map", "check", unique[0]).out
+    monkeypatch.setattr("firstfix.cli.map.MOST_CELLS", 1000)
+    assert "Ask for it with --samples 40" in cli("map", "check", unique[0]).out
     assert "2 random places" in cli("map", "check", unique[0], "--samples", 2).out
     assert cli("map", "check", unique[0], "--samples", 0).out.endswith("no traps found\n")
 
@@ -137,7 +126,7 @@ def test_map_check_of_a_map_with_nothing_in_it(cli, tmp_path: Path, grey: int, w
     assert (ended.status, ended.err) == (0, "")
     assert "warning: " in ended.out
     told = ended.out.splitlines()[-1]
-    assert told.startswith("which places look alike cannot be told: ")
+    assert told.startswith("Perceptual aliasing cannot be measured: ")
     assert word in told
 
 
@@ -156,33 +145,46 @@ def test_map_show_draws_here_and_never_over_the_map(cli, unique: Files, tmp_path
 
 
 @pytest.fixture
-def short_story(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the robot of the demo stand, and be carried away: some seconds instead of a minute."""
-    acts = (Stand(1.0), CarryTo(seconds=1.0), Stand(1.0), Teleport(), Stand(3.0))
-    monkeypatch.setattr("firstfix.lab.scenarios.demo_scenario.SCRIPT", acts)
+def short_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the robot of the demo stand and be kidnapped twice: seconds instead of minutes."""
+    phases = (Stand(1.0), CarryTo(seconds=1.0), Stand(1.0), Teleport(), Stand(3.0))
+    monkeypatch.setattr("firstfix.lab.scenarios.demo.SCRIPT", phases)
 
 
 @pytest.mark.slow
-def test_the_demo_tells_a_story_that_ends_well(cli, tmp_path: Path) -> None:
+def test_the_demo_finds_and_tracks_the_robot_three_times(cli, tmp_path: Path) -> None:
     ended = cli("demo", "--world", "house", "--headless", "--seed", 3)
     assert (ended.status, ended.err) == (0, ""), ended
-    for word in ("Building", "Wakes up", "Carried", "Kidnapped", "by the first scan", "noticed"):
-        assert word in ended.out
+    for words in ("Building", "wakes up", "carries it", "teleported", "by the first scan"):
+        assert words in ended.out
+    assert ended.out.count("Tracked: ") == 3
+    assert "Live page  run " in ended.out
     assert "found again" in ended.out.splitlines()[-1]
     assert (tmp_path / "firstfix-demo.png").stat().st_size > 5000
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("short_story")
-def test_the_demo_says_so_where_nobody_can_know(cli) -> None:
+@pytest.mark.usefixtures("short_scenario")
+def test_in_identical_rooms_the_demo_publishes_nothing_and_that_is_correct(cli) -> None:
     ended = cli("demo", "--world", "rooms", "--headless", "--seed", 3)
-    assert (ended.status, ended.err) == (1, "")
-    assert ended.out.count("not found") == 3
-    assert "not all went well" in ended.out.splitlines()[-1]
+    assert (ended.status, ended.err) == (0, "")
+    sentence = "AMBIGUOUS: 4 identical rooms, 25 % each; published nothing. Correct."
+    assert ended.out.count(sentence) == 3
+    assert "correct" in ended.out.splitlines()[-1]
 
 
-@pytest.mark.usefixtures("short_story")
-def test_the_demo_without_matplotlib_tells_its_story_all_the_same(
+@pytest.mark.slow
+@pytest.mark.usefixtures("short_scenario")
+def test_a_demo_with_a_wrong_pose_fails(cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firstfix.lab.scenarios.demo.is_found", lambda *_: False)
+    ended = cli("demo", "--world", "house", "--headless", "--seed", 3)
+    assert ended.status == 1
+    assert "WRONG: found " in ended.out
+    assert "failed" in ended.out.splitlines()[-1]
+
+
+@pytest.mark.usefixtures("short_scenario")
+def test_the_demo_without_matplotlib_has_no_picture(
     cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
@@ -194,7 +196,7 @@ def test_the_demo_without_matplotlib_tells_its_story_all_the_same(
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("short_story")
+@pytest.mark.usefixtures("short_scenario")
 def test_the_demo_takes_a_map_of_ones_own(cli, unique: Files) -> None:
     assert cli("demo", "--headless", "--world", unique[0], "--plot", "own.svg").status in (0, 1)
     assert Path("own.svg").exists()

@@ -102,7 +102,7 @@ def test_a_map_of_ones_own_is_served_read_only_with_a_token(unique: Files) -> No
 
 def assert_one_line(ended: Any, *words: str) -> None:
     assert (ended.status, ended.out) == (2, ""), ended
-    assert ended.err.startswith("firstfix: expected ")
+    assert ended.err.startswith("firstfix: ")
     assert ended.err.count("\n") == 1
     for word in words:
         assert word in ended.err
@@ -161,7 +161,7 @@ def test_a_picture_of_the_demo_needs_the_story(cli) -> None:
 
 
 def test_a_browser_is_opened_only_where_somebody_sits(monkeypatch, capsys) -> None:
-    from firstfix.cli import live
+    from firstfix.cli.serve import _announce
     from firstfix.web.access_control import AccessPolicy
     from firstfix.web.server import listen
 
@@ -171,13 +171,13 @@ def test_a_browser_is_opened_only_where_somebody_sits(monkeypatch, capsys) -> No
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     with listen("127.0.0.1", 0) as listening:
-        live._tell(listening, AccessPolicy())
+        _announce(listening, AccessPolicy())
         assert opened == []
         monkeypatch.setenv("DISPLAY", ":0")
-        live._tell(listening, AccessPolicy())
+        _announce(listening, AccessPolicy())
         assert opened == []  # in a pipe
         monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-        live._tell(listening, AccessPolicy(TOKEN))
+        _announce(listening, AccessPolicy(TOKEN))
     (url,) = opened
     assert url.endswith(f"#token={TOKEN}")
     assert url in capsys.readouterr().out

@@ -8,6 +8,8 @@ import math
 import pytest
 
 from firstfix.core.errors import InputError
+from firstfix.fields.range_table import DIRECTIONS
+from firstfix.fields.search_grid import MAX_POSITIONS
 from firstfix.global_localization.config import LocateConfig, Method
 
 
@@ -52,3 +54,7 @@ def test_settings_do_not_change():
 
 def test_methods_have_the_names_of_the_command_line():
     assert {method.value for method in Method} == {"fast", "paper", "paper-basic"}
+
+
+def test_by_default_the_largest_search_grid_is_searched_whole():
+    assert LocateConfig().max_poses == MAX_POSITIONS * DIRECTIONS

@@ -1,20 +1,51 @@
-"""``firstfix bench``: how good it is, how fast, on which cases."""
+"""``firstfix bench``: how good the localization is and what it costs, measured on cases."""
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from firstfix.cli.bench_kidnap import PANEL as KIDNAP_PANEL
-from firstfix.cli.bench_kidnap import MoreCases, Scenarios, Worlds, bench_kidnap
-from firstfix.cli.bench_locate import bench_locate
-from firstfix.cli.bench_suite import Runs, Suites, bench_suite
-from firstfix.cli.bench_track import PANEL, Params, Seed, bench_track
-from firstfix.cli.options import refuse_options
+from firstfix.cli.progress import progress
 from firstfix.core.errors import InputError
 from firstfix.global_localization.config import Method
+
+if TYPE_CHECKING:
+    from firstfix.lab.experiments.benchmark import Benchmark
+    from firstfix.lab.experiments.case import Case
+
+TRACKING, KIDNAPPING, STARTING, SUITES = "Tracking", "Kidnapping", "Starts", "Suites"
+
+KIDNAP_SCENARIOS, KIDNAP_DRIVES = 20, 3
+PAPER_DRIVES = 5
+STARTS = 20
+
+# In these rooms no robot can be found, because all places are identical.
+_HOPELESS = {"rooms"}
+
+
+class Suite(Enum):
+    """Experiments that are more than a run over cases."""
+
+    PAPER = "paper"
+    SCALING = "scaling"
+    ABLATION = "ablation"
+
+
+# Which options belong to which benchmark. --json belongs to all.
+_LOCATE = {"CASES", "--method", "--wrong-map", "--limit", "--sensor", "--jobs", "--report"}
+_OPTIONS = {
+    "locating": _LOCATE,
+    "--track": {"CASES", "--params", "--seed", "--sensor", "--jobs"},
+    "--kidnap": {"CASES", "--worlds", "--scenarios", "--seed", "--sensor", "--jobs", "--report"},
+    "--starts": {"CASES", "--runs", "--seed", "--sensor", "--jobs", "--report"},
+    "--suite paper": {"--worlds", "--runs", "--seed", "--jobs", "--report"},
+    "--suite scaling": {"--seed", "--report"},
+    "--suite ablation": {"CASES", "--limit", "--sensor", "--jobs", "--report"},
+}
+_WITHOUT_CASES = {"--kidnap", "--suite paper", "--suite scaling"}
 
 
 def bench(
@@ -28,7 +59,16 @@ def bench(
     ] = None,
     method: Annotated[
         list[Method] | None,
-        typer.Option(help="Which method; may be given several times.", show_default="fast"),
+        typer.Option(help="Which method. Repeatable.", show_default="fast"),
+    ] = None,
+    sensor: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FOV,RANGE",
+            help="Cut the scans to a sensor with this field of view (degrees) and range (m), such "
+            "as 60,5; `recorded` leaves them as they are. Repeatable.",
+            show_default="recorded",
+        ),
     ] = None,
     json_file: Annotated[
         Path | None,
@@ -47,106 +87,193 @@ def bench(
     limit: Annotated[
         int, typer.Option(min=0, help="Scans of a case, evenly spaced; 0 tries all.")
     ] = 0,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            min=0, help="Of all randomness.", show_default="random_seed of --params, else 0"
+        ),
+    ] = None,
     tracked: Annotated[
         bool,
         typer.Option(
             "--track",
-            help="Follow each case with odometry from its true start instead.",
-            rich_help_panel=PANEL,
+            help="Track each case with odometry from its true start instead.",
+            rich_help_panel=TRACKING,
         ),
     ] = False,
-    params: Params = None,
-    seed: Seed = None,
+    params: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="YAML",
+            help="Parameters of Nav2's AMCL.",
+            show_default="Nav2's own",
+            rich_help_panel=TRACKING,
+        ),
+    ] = None,
+    starts: Annotated[
+        bool,
+        typer.Option(
+            "--starts",
+            help="Start the localizer at random places of each recorded drive instead.",
+            rich_help_panel=STARTING,
+        ),
+    ] = False,
     kidnapped: Annotated[
         bool,
         typer.Option(
             "--kidnap",
             help="Kidnap simulated robots, and with cases recorded ones, instead.",
-            rich_help_panel=KIDNAP_PANEL,
+            rich_help_panel=KIDNAPPING,
         ),
     ] = False,
-    scenarios: Scenarios = None,
-    worlds: Worlds = None,
-    more_cases: MoreCases = None,
-    suite: Suites = None,
-    runs: Runs = None,
+    scenarios: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Scenarios in each world, joined drives of each case.",
+            show_default=f"{KIDNAP_SCENARIOS}, {KIDNAP_DRIVES}",
+            rich_help_panel=KIDNAPPING,
+        ),
+    ] = None,
+    worlds: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME...",
+            help="Built-in buildings: office, warehouse, house, corridor, rooms.",
+            show_default="all but rooms, which are identical; none with cases",
+            rich_help_panel=KIDNAPPING,
+        ),
+    ] = None,
+    more_cases: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--cases",
+            metavar="DIR",
+            help="The same as CASES. Repeatable.",
+            rich_help_panel=KIDNAPPING,
+        ),
+    ] = None,
+    suite: Annotated[
+        Suite | None,
+        typer.Option(
+            help="paper: ways of starting in built-in buildings. scaling: time and memory against "
+            "area, beams and threads. ablation: CASES with each step of the default method left "
+            "out.",
+            show_default=False,
+            rich_help_panel=SUITES,
+        ),
+    ] = None,
+    runs: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Drives in each world (--suite paper), starts on each drive (--starts).",
+            show_default=f"{PAPER_DRIVES}, {STARTS}",
+            rich_help_panel=SUITES,
+        ),
+    ] = None,
 ) -> None:
     """Locate every scan of every case and compare with the truth.
 
-    Times are processor time of one scan, kernels compiled, map prepared; memory is the peak of a
-    process that does nothing else. The totals 'total' and 'wrong_map' of the JSON are those of
-    the first --method; 'totals' has one for each.
+    Times are processor time of one scan, with compiled kernels and a prepared map. Memory is the
+    peak of a process that does nothing else. The totals 'total' and 'wrong_map' of the JSON are
+    those of the first --method and --sensor; 'totals' has one for each.
     """
-    cases = [*(cases or []), *(more_cases or [])]
-    of_locating = {"--method": method, "--wrong-map": wrong_map, "--limit": limit}
-    of_kidnapping = {"--kidnap": kidnapped, "--scenarios": scenarios, "--worlds": worlds}
-    of_suites = {"--suite": suite, "--runs": runs}
+    folders = [*(cases or []), *(more_cases or [])]
+    given: dict[str, Any] = {
+        "CASES": folders,
+        "--method": method,
+        "--sensor": sensor,
+        "--wrong-map": wrong_map,
+        "--limit": limit,
+        "--jobs": jobs > 1,
+        "--report": report,
+        "--seed": seed,
+        "--params": params,
+        "--scenarios": scenarios,
+        "--worlds": worlds,
+        "--runs": runs,
+    }
+    asked = {"--track": tracked, "--starts": starts, "--kidnap": kidnapped}
     if suite is not None:
-        others: dict[str, object] = {
-            "--method": method,
-            "--wrong-map": wrong_map,
-            "--params": params,
-        }
-        others |= {"--track": tracked, "--kidnap": kidnapped, "--scenarios": scenarios}
-        refuse_options(f"--suite {suite.value}", others)
-        bench_suite(
-            suite,
-            cases,
-            worlds=worlds,
-            runs=runs,
-            seed=seed,
-            limit=limit,
-            jobs=jobs,
-            json_file=json_file,
-            report=report,
+        asked[f"--suite {suite.value}"] = True
+    measure = _check_options([name for name, is_asked in asked.items() if is_asked], given)
+
+    from firstfix.lab import benchmarks
+    from firstfix.lab.experiments.case import find_cases, parse_sensor
+    from firstfix.lab.experiments.paper_bench import PAPER_WORLDS
+    from firstfix.lab.experiments.track_log import load_config
+    from firstfix.lab.reports.output_files import check_targets
+    from firstfix.lab.worlds.catalog import WORLDS, parse_worlds
+
+    sensors = list(dict.fromkeys(parse_sensor(text) for text in sensor or ["recorded"]))
+    found: list[Case] = benchmarks.cut_to_sensors(find_cases(folders), sensors)
+    first_seed = seed or 0
+    if measure == "--track":
+        benchmark = benchmarks.track_benchmark(found, load_config(params, seed).localizer.amcl)
+    elif measure == "--starts":
+        benchmark = benchmarks.start_benchmark(found, runs or STARTS, first_seed)
+    elif measure == "--kidnap":
+        usual = [] if folders else [name for name in WORLDS if name not in _HOPELESS]
+        benchmark = benchmarks.kidnap_benchmark(
+            usual if worlds is None else parse_worlds(worlds, WORLDS),
+            scenarios or KIDNAP_SCENARIOS,
+            found,
+            scenarios or KIDNAP_DRIVES,
+            first_seed,
         )
-        return
-    if tracked:
-        refuse_options("--track", {"--report": report, **of_locating, **of_kidnapping, **of_suites})
-        _check_cases(cases)
-        bench_track(cases, json_file, jobs, params, seed)
-        return
-    if kidnapped:
-        refuse_options("--kidnap", {"--params": params, **of_locating, **of_suites})
-        bench_kidnap(
-            cases,
-            worlds,
-            scenarios=scenarios,
-            seed=seed or 0,
-            jobs=jobs,
-            json_file=json_file,
-            report=report,
-        )
-        return
-    if scenarios is not None or worlds is not None:
-        raise InputError(
-            expected="--scenarios with --kidnap, --worlds with it or --suite paper",
-            received="one of them without",
-            remedy="add --kidnap, or leave them out",
-        )
-    if params is not None or seed is not None:
-        raise InputError(
-            expected="--params and --seed with --track, or --seed with --kidnap or --suite",
-            received="one of them without",
-            remedy="add --track, or leave them out: locating has no chance in it",
-        )
-    refuse_options("locating", of_suites)
-    _check_cases(cases)
-    bench_locate(
-        cases,
-        list(dict.fromkeys(method or [Method.FAST])),
-        wrong_map=wrong_map,
-        jobs=jobs,
-        limit=limit,
-        json_file=json_file,
-        report=report,
-    )
+    elif measure == "--suite paper":
+        names = list(PAPER_WORLDS) if worlds is None else parse_worlds(worlds, PAPER_WORLDS)
+        benchmark = benchmarks.paper_benchmark(names, runs or PAPER_DRIVES, first_seed)
+    elif measure == "--suite scaling":
+        check_targets(json_file, report)  # drawing the maps takes a while
+        benchmark = benchmarks.scaling_benchmark(first_seed)
+    elif measure == "--suite ablation":
+        benchmark = benchmarks.ablation_benchmark(found, limit)
+    else:
+        methods = list(dict.fromkeys(method or [Method.FAST]))
+        benchmark = benchmarks.locate_benchmark(found, methods, limit, with_wrong_maps=wrong_map)
+    _run(benchmark, jobs, json_file, report)
 
 
-def _check_cases(cases: list[Path]) -> None:
-    if not cases:
+def _check_options(asked: list[str], given: dict[str, Any]) -> str:
+    """Return the benchmark that was asked for; refuse options that do not belong to it."""
+    if len(asked) > 1:
+        raise InputError(
+            expected="one benchmark",
+            received=f"{asked[0]} with {', '.join(asked[1:])}",
+            remedy="run them one after the other",
+        )
+    measure = asked[0] if asked else "locating"
+    wrong = [name for name, value in given.items() if value and name not in _OPTIONS[measure]]
+    wrong += ["--seed"] if given["--seed"] == 0 and "--seed" not in _OPTIONS[measure] else []
+    if wrong:
+        fitting = [name for name, options in _OPTIONS.items() if set(wrong) <= options]
+        raise InputError(
+            expected=f"{measure} with options that belong to it",
+            received=f"{measure} with {', '.join(wrong)}",
+            remedy=f"leave out {', '.join(wrong)}"
+            + (f", or ask for {' or '.join(fitting)}" if fitting else ""),
+        )
+    if measure not in _WITHOUT_CASES and not given["CASES"]:
         raise InputError(
             expected="CASES: at least one folder of a case, or of cases",
             received="none",
             remedy="name one; only --kidnap and --suite paper or scaling can do without",
         )
+    return measure
+
+
+def _run(benchmark: Benchmark, jobs: int, json_file: Path | None, report: Path | None) -> None:
+    from firstfix.lab.reports.output_files import check_targets, write_json
+
+    check_targets(json_file, report)
+    with progress(len(benchmark.tasks), "bench") as done:
+        summary = benchmark.run(jobs, done)
+    for note in summary.notes:
+        typer.echo(f"note: {note}", err=True)
+    typer.echo("\n".join(summary.tables), nl=False)
+    if json_file is not None:
+        write_json(summary.document, json_file)
+    if report is not None and summary.write_report is not None:
+        typer.echo(f"report: {summary.write_report(report)}", err=True)

@@ -1,23 +1,30 @@
-"""``firstfix demo``: a robot is found, followed, carried away and found again."""
+"""``firstfix demo``: a robot is found, tracked, carried away and found again."""
 
 from __future__ import annotations
 
 import math
+import shutil
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from firstfix.cli.live import PORT, Address, Rest, serve_simulated
 from firstfix.cli.progress import working
-from firstfix.cli.worlds import world_or_map
+from firstfix.cli.serve import PORT, Address, Rest, serve_simulated
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
     from firstfix.core.grid import OccupancyGrid
-    from firstfix.lab.scenarios.episodes import DemoStep, Episode
+    from firstfix.lab.scenarios.demo import DemoStep, Episode
 
 FAILED = 1
+
+_EPISODES = (
+    "The robot wakes up at {pose}. It does not know this.",
+    "A person carries it to {pose}. The wheel-drop sensors report that it was lifted.",
+    "It is teleported to {pose}, and no sensor reports it.",
+)
 
 
 def demo(
@@ -28,29 +35,31 @@ def demo(
             help="office, warehouse, house, corridor, rooms, or a map of your own.",
         ),
     ] = "office",
-    seed: Annotated[int, typer.Option(min=0, help="Another seed, another story.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of places, noise and wheel slip.")] = 1,
     headless: Annotated[
-        bool, typer.Option("--headless", help="Tell a story here instead, and end.")
+        bool, typer.Option("--headless", help="Run a fixed scenario in the terminal instead.")
     ] = False,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: any.")] = PORT,
     plot: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="With --headless, where the picture goes: .png, .svg or .pdf.",
+            help="With --headless, the picture: .png, .svg or .pdf.",
+            show_default="firstfix-demo.png",
         ),
     ] = None,
 ) -> None:
-    """Let a simulated Kobuki wake up in a building that it has a map of, and see what happens.
+    """Simulate a Kobuki that wakes up at an unknown place of a building, and localize it.
 
-    A page shows it being found without motion, and followed while it drives about. There you can
-    send it somewhere, pick it up and put it down elsewhere, or let people get in its way.
+    The live page shows how it is found without motion and tracked while it drives. There you can
+    set goals, carry it elsewhere, or let people walk around it.
 
-    With `--headless` a story is told here: it is found, driven, carried away by somebody, then
-    somewhere else all of a sudden, and nothing but its LIDAR can notice. Exit status 0 if all went
-    well, 1 if it was not found, found in the wrong place, or lost. In rooms, and mostly in the
-    corridor, that is so: these look the same everywhere.
+    With `--headless` a fixed scenario runs in the terminal: the robot is found, drives, is carried
+    away, drives, and is teleported. Exit status 0 if every answer was correct, 1 if the robot was
+    not found, found at a wrong place, or lost. Where places are identical, as in `rooms`, the
+    correct answer is AMBIGUOUS.
     """
+    from firstfix.lab.worlds.catalog import world_or_map
     from firstfix.plots.figure import check_path
 
     picture = plot or Path("firstfix-demo.png")
@@ -59,83 +68,89 @@ def demo(
         raise InputError(
             expected="--plot with --headless",
             received=f"--plot {plot} alone",
-            remedy="the page is all the picture that there is otherwise",
+            remedy="add --headless",
         )
     grid = world_or_map(world)
-    typer.echo(
-        f"Building   {world}: {grid.width} x {grid.height} cells of {grid.resolution:g} m, "
-        f"{grid.free_area:.0f} m² free"
-    )
+    size = f"{grid.width * grid.resolution:.0f} x {grid.height * grid.resolution:.0f} m"
+    typer.echo(f"Building   {world}: {size}, {grid.free_area:.0f} m² free")
     if headless:
-        _tell_story(grid, seed, picture)
+        _run_scenario(grid, world, seed, picture)
     else:
         serve_simulated(grid, Path(world).stem, seed, Address("127.0.0.1", port), Rest.SLEEPS)
 
 
-def _tell_story(grid: OccupancyGrid, seed: int, plot: Path) -> None:
+def _run_scenario(grid: OccupancyGrid, world: str, seed: int, plot: Path) -> None:
+    from firstfix.lab.reports.scenario_picture import draw_scenario
+    from firstfix.lab.scenarios.demo import run_demo, summarize_episodes
+    from firstfix.localizer.localizer import Localizer
+    from firstfix.localizer.precompile import precompile
     from firstfix.plots.figure import can_draw
 
-    with working("preparing the map"):
-        # The kernels too: what they take to compile is no part of the story.
-        from firstfix.lab.scenarios.demo_scenario import run_demo, warm_up
-        from firstfix.lab.scenarios.episodes import summarize_episodes
-        from firstfix.localizer.localizer import Localizer
-
-        warm_up()
-    with working("the robot drives, and somebody is up to something"):
+    with working("compiling the kernels"):
+        precompile()
+    with working("simulating the robot"):
         steps = list(run_demo(grid, seed, Localizer()))
     episodes = summarize_episodes(steps)
-    for line in _told(steps, episodes):
-        typer.echo(line)
+    places = "identical rooms" if world == "rooms" else "places fit equally well"
+    for number, (episode, words) in enumerate(zip(episodes, _EPISODES, strict=False), 1):
+        typer.echo(f"\n{number}. {_opening(episode, words)}")
+        for line in _episode_lines(episode, places):
+            typer.echo(f"   {line}")
+    typer.echo(f"\nCPU        {_cpu_text(steps)}")
     picture = "none, because matplotlib is missing: pip install 'firstfix[plot]'"
     if can_draw():
-        from firstfix.lab.reports.scenario_picture import draw_scenario
-
         picture = f"{draw_scenario(grid, steps, plot)}"
     typer.echo(f"Picture    {picture}")
-    if not all(episode.went_well for episode in episodes):
-        typer.echo("The end    not all went well.")
+    program = "firstfix" if shutil.which("firstfix") else sys.argv[0]
+    typer.echo(f"Live page  run `{program} demo` and open the address that it prints")
+    typer.echo(f"Result     {_result_text(episodes)}")
+    if not all(episode.is_tracked or episode.is_correctly_ambiguous for episode in episodes):
         raise typer.Exit(FAILED)
-    typer.echo("The end    found, followed, carried away, found again. Nobody had to help.")
 
 
-def _told(steps: list[DemoStep], episodes: list[Episode]) -> list[str]:
-    from firstfix.cli.answers import pose_text
+def _opening(episode: Episode, words: str) -> str:
+    from firstfix.lab.reports.text import pose_text
 
-    titles = ("Wakes up", "Carried", "Kidnapped")
-    opening = (
-        "at {pose}, and does not know it",
-        "off by somebody; its wheels hang, and are heard to. Set down at {pose}",
-        "in an instant, and no wheel or switch tells. Now at {pose}",
-    )
-    lines = []
-    for episode, title, words in zip(episodes, titles, opening, strict=False):
-        first = next(step for step in steps if step.stamp >= episode.began_s)
-        lines.append(f"\n{title:10s} {words.format(pose=pose_text(first.truth))}")
-        lines += [f"           {line}" for line in _episode_lines(episode)]
-    cpu = sorted(step.cpu_s for step in steps)
-    lines.append(
-        f"\nTime       {steps[-1].stamp:.0f} s of it, {len(steps)} scans; the localizer took "
-        f"{1e3 * cpu[len(cpu) // 2]:.1f} ms of processor a scan (median), "
-        f"{1e3 * cpu[-1]:.0f} ms at most, {sum(cpu) / steps[-1].stamp:.1%} of one core"
-    )
-    return lines
+    return words.format(pose=pose_text(episode.truth))
 
 
-def _episode_lines(episode: Episode) -> list[str]:
-    wrong = [f"{episode.wrong_finds} times found where it was not"] if episode.wrong_finds else []
+def _episode_lines(episode: Episode, places: str) -> list[str]:
+    times = "once" if episode.wrong_finds == 1 else f"{episode.wrong_finds} times"
+    wrong = [f"WRONG: found {times} where it was not."] if episode.wrong_finds else []
+    if episode.is_correctly_ambiguous:
+        equal = episode.equal_places
+        share = sum(place.probability for place in equal) / len(equal)
+        answer = f"AMBIGUOUS: {len(equal)} {places}, {100 * share:.0f} % each"
+        return [f"{answer}; published nothing. Correct."]
     if episode.found_s is None:
-        return [*wrong, "not found"]
+        return [*wrong, "Not found. No pose was published."]
+    noticed = f"Noticed after {episode.noticed_s:.1f} s. " if episode.noticed_s else ""
     when = "by the first scan" if episode.found_s < 0.05 else f"after {episode.found_s:.1f} s"
-    noticed = f"noticed after {episode.noticed_s:.1f} s, " if episode.noticed_s else ""
     found = (
-        f"{noticed}found {when}, {100 * episode.found_error_m:.1f} cm and "
-        f"{episode.found_error_deg:.2f}° from the truth"
+        f"{noticed}Found {when}, {100 * episode.found_error_m:.1f} cm and "
+        f"{episode.found_error_deg:.2f}° from the true pose."
     )
     if math.isnan(episode.kept):
         return [*wrong, found]
-    followed = (
-        f"followed: {episode.kept:.1%} of the scans within 0.5 m and 10°, "
-        f"error {100 * episode.rmse_m:.1f} cm and {episode.rmse_deg:.2f}° (RMSE)"
+    tracked = (
+        f"Tracked: {100 * episode.kept:.1f} % of the scans within 0.5 m and 10°, "
+        f"error {100 * episode.rmse_m:.1f} cm and {episode.rmse_deg:.2f}° (RMSE)."
     )
-    return [*wrong, found, followed]
+    return [*wrong, found, tracked]
+
+
+def _cpu_text(steps: list[DemoStep]) -> str:
+    cpu = sorted(step.cpu_s for step in steps)
+    return (
+        f"{1e3 * cpu[len(cpu) // 2]:.1f} ms a scan (median), {1e3 * cpu[-1]:.0f} ms at most, "
+        f"{100 * sum(cpu) / steps[-1].stamp:.1f} % of one core; {len(steps)} scans in "
+        f"{steps[-1].stamp:.0f} s of simulated time"
+    )
+
+
+def _result_text(episodes: list[Episode]) -> str:
+    if all(episode.is_tracked for episode in episodes):
+        return "found, tracked, carried away and found again, without help."
+    if all(episode.is_tracked or episode.is_correctly_ambiguous for episode in episodes):
+        return "correct: no pose was published where several places fit equally well."
+    return "failed: not every answer was correct."

@@ -1,9 +1,11 @@
-"""``firstfix locate``: where the robot was when it took a scan."""
+"""``firstfix locate``: the pose at which a scan was taken."""
 
 from __future__ import annotations
 
 import json
+import math
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,9 +16,15 @@ from firstfix.core.errors import InputError, ScanError
 from firstfix.global_localization.config import Method
 
 if TYPE_CHECKING:
+    from firstfix.core.estimate import Hypothesis, LocateResult
     from firstfix.core.recording import Recording
+    from firstfix.core.se2 import SE2
 
 NO_ANSWER = 1
+
+# What is listed for a person: places that are likely at all, and some to compare them with.
+_LEAST_PROBABILITY = 0.001
+_FEWEST_ROWS, _MOST_ROWS = 3, 10
 
 
 def locate(
@@ -42,7 +50,6 @@ def locate(
     One scan (not --all) ends with exit status 0 if its place is UNIQUE and 1 if it is not.
     """
     _check_options(index, every, plot)
-    from firstfix.cli.answers import as_text
     from firstfix.core.estimate import Verdict
     from firstfix.io.logs.load import load_recording
     from firstfix.io.maps.map_server import load_map
@@ -56,7 +63,7 @@ def locate(
         typer.echo(f"note: {note}", err=True)
 
     with working("preparing the map"):
-        # After the reading: input that cannot be used is told before the kernels are loaded.
+        # Imported after the files are read, so that bad input is refused at once.
         from firstfix.fields.cache import cache_folder
         from firstfix.global_localization.scan_matcher import ScanMatcher
 
@@ -69,7 +76,7 @@ def locate(
             if as_lines:
                 typer.echo(json.dumps(result.to_dict(i, truth), allow_nan=False))
             else:
-                typer.echo(f"{f'scan {i}: ' if every else ''}{as_text(result, truth)}")
+                typer.echo(f"{f'scan {i}: ' if every else ''}{_as_text(result, truth)}")
             done(result.verdict.value)
     if plot is not None:
         from firstfix.plots.answer_picture import draw_answer
@@ -89,10 +96,9 @@ def _check_options(index: int | None, every: bool, plot: Path | None) -> None:
             remedy="leave one of them out",
         )
     if plot is not None:
-        from firstfix.plots.figure import check_path, new_figure
+        from firstfix.lab.reports.output_files import check_picture
 
-        check_path(plot)
-        new_figure(1.0, 1.0)  # says now, not after the work, that matplotlib is missing
+        check_picture(plot)
 
 
 def _only(recording: Recording, index: int) -> range:
@@ -103,3 +109,73 @@ def _only(recording: Recording, index: int) -> range:
             remedy="choose a smaller --index",
         )
     return range(index, index + 1)
+
+
+def _as_text(result: LocateResult, truth: SE2 | None) -> str:
+    """Describe an answer in lines for a person; ``truth`` is the true ``T_map_base``."""
+    import numpy as np
+
+    from firstfix.core.pose_error import PoseError
+    from firstfix.core.se2 import SE2
+    from firstfix.lab.reports.text import pose_text
+
+    lines = [f"{result.verdict.value}: {result.reason}"]
+    best, search = result.best, result.search
+    if best is not None:
+        sigma = np.sqrt(np.clip(np.diagonal(best.covariance), 0.0, None))
+        lines += [
+            f"pose         {pose_text(best.pose)}",
+            f"σ            {pose_text(SE2.from_array(sigma))}",
+            f"probability  {best.probability:.1%}",
+            f"evidence     {_evidence_text(best)}",
+        ]
+        if truth is not None:
+            error = PoseError.between(best.pose, truth)
+            degrees = math.degrees(error.radians)
+            lines.append(f"truth        {error.metres:.3f} m, {degrees:.2f}° away")
+    proof = "optimum proven" if search.proven else "optimum not proven"
+    lines += [
+        f"search       {search.poses:,} poses, {search.searched:.0%} decided, {proof}",
+        f"time         {result.elapsed_s:.3f} s",
+    ]
+    rows = _rows(result)
+    if len(result.hypotheses) > 1:
+        lines += ["", _hypothesis_table(result.hypotheses[:rows]).rstrip()]
+    if len(result.hypotheses) > rows:
+        lines.append(f"and {len(result.hypotheses) - rows} less likely ones (--json lists all)")
+    return "\n".join(lines)
+
+
+def _evidence_text(hypothesis: Hypothesis) -> str:
+    e = hypothesis.evidence
+    return (
+        f"{e.explained:.0%} of {e.beams} beams explained, {e.short:.0%} short, "
+        f"{e.through_wall:.0%} through a wall, {e.unknown:.0%} in unknown space"
+    )
+
+
+def _rows(result: LocateResult) -> int:
+    likely = sum(h.probability >= _LEAST_PROBABILITY for h in result.hypotheses)
+    return min(_MOST_ROWS, max(_FEWEST_ROWS, likely))
+
+
+def _hypothesis_table(hypotheses: Sequence[Hypothesis]) -> str:
+    from firstfix.lab.reports.text import markdown_table
+
+    head = ["rank", "x m", "y m", "yaw °", "probability", "score", "explained", "through wall"]
+    return markdown_table(
+        head,
+        [
+            [
+                str(rank),
+                f"{h.pose.x:.3f}",
+                f"{h.pose.y:.3f}",
+                f"{math.degrees(h.pose.yaw):.2f}",
+                f"{h.probability:.1%}",
+                f"{h.score:.4f}",
+                f"{h.evidence.explained:.0%}",
+                f"{h.evidence.through_wall:.0%}",
+            ]
+            for rank, h in enumerate(hypotheses, 1)
+        ],
+    )

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from contextlib import suppress
+from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from firstfix.cli.live import PORT, Address, Rest, serve_robot, serve_simulated
-from firstfix.cli.worlds import world_or_map
 from firstfix.core.errors import InputError
+
+if TYPE_CHECKING:
+    import socket
+
+    from firstfix.core.grid import OccupancyGrid
+    from firstfix.web.access_control import AccessPolicy
+
+PORT = 8642
+SHORTEST_TOKEN = 8
 
 
 class Transport(Enum):
@@ -22,38 +33,171 @@ class Transport(Enum):
     DDS = "dds"
 
 
+class Rest(Enum):
+    """What a simulated robot does before the first viewer comes."""
+
+    AWAKE = "awake"
+    SLEEPS = "sleeps"  # so that every viewer sees how it is found
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """Where the page is, and who may use it.
+
+    Parameters
+    ----------
+    host : str
+        Name or address to listen on.
+    port : int
+        0 for any free port.
+    token : str or None
+        What clients must send.
+    may_steer : bool
+        False if clients may only watch.
+    """
+
+    host: str
+    port: int
+    token: str | None = None
+    may_steer: bool = True
+
+    def access(self) -> AccessPolicy:
+        """Return the rules for clients.
+
+        Raises
+        ------
+        InputError
+            If the token is missing or too short.
+        """
+        from firstfix.web.access_control import AccessPolicy, is_loopback
+
+        inside = is_loopback(self.host)
+        if self.token is None and not inside:
+            raise InputError(
+                expected=f"a --token, because {self.host} can be reached by other machines",
+                received="none",
+                remedy="choose one, or leave --host out",
+            )
+        if self.token is not None and len(self.token) < SHORTEST_TOKEN:
+            raise InputError(
+                expected=f"a token of at least {SHORTEST_TOKEN} characters",
+                received=f"{len(self.token)}",
+                remedy="make it longer; only programs and links need to remember it",
+            )
+        return AccessPolicy(self.token, may_steer=self.may_steer, loopback_only=inside)
+
+
 def serve(
     context: typer.Context,
     map_: Annotated[
-        str, typer.Argument(metavar="MAP", help="The map's YAML; for `sim` also a built-in world.")
+        str, typer.Argument(metavar="MAP", help="YAML of a map; for `sim` also a built-in world.")
     ],
-    robot: Annotated[Transport, typer.Option(help="Which robot is in it.")] = Transport.SIM,
+    robot: Annotated[Transport, typer.Option(help="Which robot is served.")] = Transport.SIM,
     host: Annotated[
         str, typer.Option(help="Address to listen on; others than loopback need a token.")
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="0: any that is free.")] = PORT,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="0: any free port.")] = PORT,
     token: Annotated[
         str | None,
-        typer.Option(envvar="FIRSTFIX_TOKEN", help="What viewers and programs must know."),
+        typer.Option(envvar="FIRSTFIX_TOKEN", help="What viewers and programs must send."),
     ] = None,
     read_only: Annotated[
-        bool, typer.Option("--read-only", help="Let people watch and ask, not steer.")
+        bool, typer.Option("--read-only", help="Viewers can watch and ask, but not steer.")
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Of the simulated robot.")] = 1,
 ) -> None:
-    """Show on a page where a robot is, and why; answer programs that ask where they are.
+    """Show the state of a robot on a live page, and answer requests for its pose.
 
-    `docs/live.md` has the API. What follows `--` goes to ROS: `firstfix serve map.yaml --robot
+    `docs/live.md` has the API. Arguments after `--` go to ROS: `firstfix serve map.yaml --robot
     ros1 -- scan:=base_scan`.
     """
     address = Address(host, port, token, may_steer=not read_only)
-    if robot is Transport.SIM:
-        if context.args:
-            raise InputError(
-                expected="a map, and options",
-                received=f"also {context.args[0]}",
-                remedy="arguments of ROS go with --robot ros1, ros2 or dds",
-            )
-        serve_simulated(world_or_map(map_), Path(map_).stem, seed, address, Rest.AWAKE)
-    else:
+    if robot is not Transport.SIM:
         serve_robot(robot.value, Path(map_), context.args, address)
+        return
+    if context.args:
+        raise InputError(
+            expected="a map, and options",
+            received=f"also {context.args[0]}",
+            remedy="arguments of ROS go with --robot ros1, ros2 or dds",
+        )
+    from firstfix.lab.worlds.catalog import world_or_map
+
+    serve_simulated(world_or_map(map_), Path(map_).stem, seed, address, Rest.AWAKE)
+
+
+def serve_simulated(
+    grid: OccupancyGrid, name: str, seed: int, address: Address, rest: Rest
+) -> None:
+    """Serve the page of a simulated robot in a building called ``name`` until it is interrupted.
+
+    Raises
+    ------
+    InputError
+        If it cannot be served at this address.
+    """
+    from firstfix.global_localization.searchable import check_searchable
+    from firstfix.lab.live.simulated_node import SimNode
+    from firstfix.lab.live.steered_robot import SimRobot
+    from firstfix.web.command_executor import CommandExecutor
+    from firstfix.web.page import Page
+    from firstfix.web.server import listen, make_server
+    from firstfix.web.snapshot_store import SnapshotStore
+
+    access = address.access()
+    check_searchable(grid)
+    with listen(address.host, address.port) as listening:
+        store = SnapshotStore(name)
+
+        def warn(text: str) -> None:
+            typer.echo(text, err=True)
+            store.add_event("warning", text.partition("\n")[0])
+
+        robot = SimRobot(grid, seed)
+        if rest is Rest.SLEEPS:
+            robot.pause()
+        node = SimNode(grid, robot, [store], store.set_truth, warn)
+        executor = CommandExecutor(store, node.give, robot)
+        page = Page("sim", store, executor, access, on_first_viewer=robot.go_on)
+        node.start()
+        _announce(listening, access)
+        with suppress(KeyboardInterrupt):  # the usual end
+            make_server(page).run(sockets=[listening])
+        node.stop()
+
+
+def serve_robot(robot: str, map_path: Path, arguments: list[str], address: Address) -> None:
+    """Run the node of a robot (ros1, ros2, dds) with arguments of ROS, and serve its page.
+
+    Raises
+    ------
+    InputError
+        If the map or an argument cannot be used, or the page cannot be served at this address.
+    """
+    from firstfix.cli.nodes import runner
+    from firstfix.global_localization.searchable import check_searchable
+    from firstfix.io.maps.map_server import load_map
+    from firstfix.web.background_page import BackgroundPage
+    from firstfix.web.server import listen
+
+    access, run = address.access(), runner(robot)
+    check_searchable(load_map(map_path))
+    with listen(address.host, address.port) as listening:
+        _announce(listening, access)
+        with BackgroundPage(robot, map_path.stem, access, listening) as page:
+            run(f"{map_path.resolve()}", arguments, page.make_node)
+
+
+def _announce(listening: socket.socket, access: AccessPolicy) -> None:
+    """Print the address of the page, and open it in a browser if there is a display."""
+    from firstfix.web.server import url_of
+
+    url = url_of(listening) + ("" if access.token is None else f"#token={access.token}")
+    typer.echo(f"Live page  {url}  (Ctrl-C ends)")
+    has_display = sys.platform in {"darwin", "win32"} or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
+    if has_display and sys.stdout.isatty():
+        import webbrowser
+
+        webbrowser.open(url)

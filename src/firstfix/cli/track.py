@@ -1,4 +1,4 @@
-"""``firstfix track``: where the robot was at every scan of a drive."""
+"""``firstfix track``: the pose at every scan of a drive."""
 
 from __future__ import annotations
 
@@ -8,19 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from firstfix.cli.progress import progress, working
-from firstfix.cli.settings import load_config
-from firstfix.cli.start import WAYS, Origin, choose_start, read_start
-from firstfix.cli.targets import check_file, check_picture
+from firstfix.cli.progress import progress
+from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
-    from firstfix.amcl.config import AmclConfig
-    from firstfix.core.grid import OccupancyGrid
-    from firstfix.core.recording import Recording
-    from firstfix.io.saved_pose import SavedPose
-    from firstfix.lab.experiments.drive import Drive
-    from firstfix.lab.experiments.drive_tracking import TrackedScan
+    from firstfix.core.se2 import SE2
 
+SEARCH, TRUTH = "search", "truth"
+STARTS = f"X,Y,YAW (m, m, rad), {SEARCH}, {TRUTH}, or the file of a saved pose"
 NO_ANSWER = 1
 
 
@@ -36,7 +31,7 @@ def track(
         str | None,
         typer.Option(
             metavar="START",
-            help=f"Pose of the base in the map at the first scan that has odometry: {WAYS}.",
+            help=f"Pose of the base in the map at the first scan that has odometry: {STARTS}.",
             show_default="initial_pose of --params where it asks for that, else the truth "
             "where the log has it",
         ),
@@ -81,99 +76,78 @@ def track(
     Where the log knows the truth, the track is compared with it. Poses are those of the base in the
     map.
     """
-    said = read_start(start)
+    requested = _parse_start(start)
     _check_targets(out, plot, keep_pose)
     from firstfix.io.logs.load import load_recording
     from firstfix.io.maps.map_server import load_map
 
-    parameters = load_config(params, seed)
-    config = parameters.localizer.amcl
     grid = load_map(map_path)
     recording = load_recording(log, topic=topic)
 
-    # After the reading: input that cannot be used is told before the kernels are loaded.
-    import numpy as np
-
-    from firstfix.cli.track_answers import track_json, track_text, track_title, trajectory_of
-    from firstfix.fields.map_fields import MapFields
-    from firstfix.lab.experiments.drive import known_odometry, plan_drive
-    from firstfix.lab.experiments.drive_tracking import check_start, follow_drive, make_tracker
+    # Imported after the files are read, so that bad input is refused at once.
+    from firstfix.lab.experiments.track_log import (
+        NeverFoundError,
+        choose_start,
+        load_config,
+        track_log,
+    )
     from firstfix.lab.metrics.track_metrics import summarize_track
+    from firstfix.lab.reports import track_report
+    from firstfix.ros.pose_memory import PoseKeeper
 
-    known_odometry(recording)  # without it, no start would help
-    begin = choose_start(said, grid, recording, parameters)
+    config = load_config(params, seed)
+    begin = choose_start(requested, grid, recording, config)
     for note in (*recording.notes, begin.note):
         typer.echo(f"note: {note}", err=True)
-    keeper, key = None, ""
-    if keep_pose is not None:
-        from firstfix.io.saved_pose import map_key
-        from firstfix.ros.pose_memory import PoseKeeper
-
-        keeper, key = PoseKeeper(keep_pose, parameters.save_pose_rate), map_key(grid)
-    if begin.origin is Origin.SEARCH:
-        drive, tracked = _searched(recording, grid, config)
-    else:
-        drive = plan_drive(recording, begin.T_map_base)
-        check_start(grid, drive.begin_at)
-        with working("preparing the map"):
-            tracker, fields = make_tracker(grid, config), MapFields(grid)
-        rng = np.random.default_rng(config.seed)
-        tracked = []
-        with progress(len(drive.sights), "tracking") as done:
-            for scan in follow_drive(drive, tracker, config, begin.covariance, rng, fields):
-                tracked.append(scan)
-                if keeper is not None:
-                    keeper.offer(_saved(scan, key))
-                done(f"{scan.particles} particles")
-    for note in drive.notes:
-        typer.echo(f"note: {note}", err=True)
-    figures = summarize_track(tracked)
-    if keeper is not None:
-        keeper.save(_saved(tracked[-1], key))
-    if out is not None:
-        from firstfix.io.logs.tum import save_trajectory
-
-        save_trajectory(trajectory_of(tracked), out)
-    if plot is not None:
-        from firstfix.lab.reports.track_picture import draw_track
-
-        typer.echo(f"picture: {draw_track(grid, tracked, plot, track_title(figures))}", err=True)
-    if as_object:
-        document = track_json(begin, drive, tracked, figures)
-        typer.echo(json.dumps(document, allow_nan=False))
-    else:
-        typer.echo(track_text(tracked, figures))
-
-
-def _searched(
-    recording: Recording, grid: OccupancyGrid, config: AmclConfig
-) -> tuple[Drive, list[TrackedScan]]:
-    from firstfix.lab.experiments.searched_start import NeverFoundError, search_and_follow
-
+    keeper = PoseKeeper(keep_pose, config.save_pose_rate) if keep_pose is not None else None
     try:
         with progress(len(recording), "tracking") as done:
-            return search_and_follow(recording, grid, config, done)
+            tracked_log = track_log(recording, grid, begin, config.localizer.amcl, done, keeper)
     except NeverFoundError as error:
         typer.echo(f"{error}")
         raise typer.Exit(NO_ANSWER) from None
+    for note in tracked_log.drive.notes:
+        typer.echo(f"note: {note}", err=True)
+    tracked = tracked_log.tracked
+    figures = summarize_track(tracked)
+    if out is not None:
+        from firstfix.io.logs.tum import save_trajectory
+
+        save_trajectory(track_report.trajectory_of(tracked), out)
+    if plot is not None:
+        title = track_report.track_title(figures)
+        typer.echo(f"picture: {track_report.draw_track(grid, tracked, plot, title)}", err=True)
+    if as_object:
+        document = track_report.track_document(tracked_log, figures)
+        typer.echo(json.dumps(document, allow_nan=False))
+    else:
+        typer.echo(track_report.track_text(tracked, figures))
 
 
-def _saved(tracked: TrackedScan, map_key: str) -> SavedPose:
-    from firstfix.io.saved_pose import SavedPose
+def _parse_start(text: str | None) -> SE2 | Path | str | None:
+    """Read ``--start`` before any file is opened: a pose, a file, ``search``, ``truth`` or None."""
+    from firstfix.core.se2 import SE2
 
-    return SavedPose(
-        T_map_base=tracked.T_map_base,
-        covariance=tracked.covariance,
-        stamp=tracked.sight.scan.stamp,
-        T_odom_base=tracked.sight.T_odom_base,
-        map_key=map_key,
-    )
+    if text is None or text in (TRUTH, SEARCH):
+        return text
+    if Path(text).is_file():
+        return Path(text)
+    try:
+        x, y, yaw = (float(number) for number in text.split(","))
+        return SE2(x, y, yaw)
+    except (ValueError, InputError):
+        raise InputError(
+            expected=f"a start as {STARTS}",
+            received=f"{text!r}, which is neither three numbers nor a file",
+            remedy="write it like --start 1.5,-2,0.7",
+        ) from None
 
 
 def _check_targets(out: Path | None, plot: Path | None, keep_pose: Path | None) -> None:
+    from firstfix.lab.reports.output_files import check_file, check_picture
+
     if plot is not None:
         check_picture(plot)
-        check_file(plot)
-    for path in (out, keep_pose):
+    for path in (plot, out, keep_pose):
         if path is not None:
             check_file(path)

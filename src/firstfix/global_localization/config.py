@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from enum import Enum
 
 from firstfix.core.settings import check_settings, setting
-from firstfix.fields.range_table import DIRECTIONS
-from firstfix.fields.search_grid import MAX_POSITIONS
+
+# The largest search grid: `search_grid.MAX_POSITIONS` times `range_table.DIRECTIONS`. Importing
+# these here would load numba with every command line.
+MAX_POSES = 102_400_000
 
 
 class Method(Enum):
@@ -43,9 +45,7 @@ class LocateConfig:
     >>> matcher = ff.ScanMatcher(grid, config=config)
     """
 
-    max_poses: int = setting(
-        MAX_POSITIONS * DIRECTIONS, "most poses that the search scores; fewer: never UNIQUE", 1
-    )
+    max_poses: int = setting(MAX_POSES, "most poses that the search scores; fewer: never UNIQUE", 1)
     shortlist: int = setting(150, "places of the search that are refined", 1, 100_000)
     hypotheses: int = setting(24, "most places in a result", 2, 1_000)
     unique_probability: float = setting(

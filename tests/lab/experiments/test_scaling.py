@@ -10,7 +10,6 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.config import Method
 from firstfix.global_localization.scan_matcher import ScanMatcher
-from firstfix.lab.experiments.machine import this_machine
 from firstfix.lab.experiments.scaling import (
     CostTask,
     Sighting,
@@ -60,7 +59,7 @@ def test_the_report_has_all_tables_and_a_plot(hall_plan: OccupancyGrid, tmp_path
     throughputs = ThroughputTask(hall_plan, seen, (1, 2))()
     assert [throughput.threads for throughput in throughputs] == [1, 2]
     assert throughputs[0].speedup == 1.0
-    document = scaling_document(costs, costs, throughputs, 0) | {"machine": this_machine()}
+    document = scaling_document([("area", costs), ("beams", costs), ("threads", throughputs)], 0)
     assert json.loads(json.dumps(document, allow_nan=False)) == document
     page = write_scaling_report(document, tmp_path / "report")
     text = page.read_text(encoding="utf-8")

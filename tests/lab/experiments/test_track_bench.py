@@ -11,11 +11,17 @@ from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.recording import Recording
 from firstfix.lab.experiments.case import Case
-from firstfix.lab.experiments.track_bench import TrackRun, track_case, track_document, track_table
+from firstfix.lab.experiments.track_bench import (
+    TrackRun,
+    TrackTask,
+    track_document,
+    track_table,
+)
 
 KEYS = [
-    "name", "n", "updates", "ape_rmse_m", "ape_rmse_deg", "ape_median_m", "ape_max_m", "kept",
-    "cpu_update_ms", "cpu_update_ms_p95", "particles_mean", "rss_mb", "rpe_rmse_m", "rpe_rmse_deg",
+    "name", "sensor", "n", "updates", "ape_rmse_m", "ape_rmse_deg", "ape_median_m", "ape_max_m",
+    "kept", "cpu_update_ms", "cpu_update_ms_p95", "particles_mean", "rss_mb",
+    "rpe_rmse_m", "rpe_rmse_deg",
 ]  # fmt: skip
 
 
@@ -26,7 +32,7 @@ def drive_case(hall_plan: OccupancyGrid, driven: Recording) -> Case:
 
 @pytest.fixture(scope="module")
 def run(drive_case: Case) -> TrackRun:
-    return track_case(drive_case, AmclConfig(), 1)
+    return TrackTask(drive_case, AmclConfig(), 1)()
 
 
 def test_a_case_is_followed_from_its_true_start(run: TrackRun, driven: Recording) -> None:
@@ -40,18 +46,18 @@ def test_a_case_is_followed_from_its_true_start(run: TrackRun, driven: Recording
 
 def test_a_case_without_odometry_is_left_out(drive_case: Case, driven: Recording) -> None:
     still = replace(drive_case, recording=lambda: replace(driven, odometry=None))
-    left_out = track_case(still, AmclConfig(), 0)
+    left_out = TrackTask(still, AmclConfig(), 0)()
     assert left_out.figures is None
 
 
 def test_a_case_without_truth_is_refused(drive_case: Case, driven: Recording) -> None:
     blind = replace(drive_case, recording=lambda: replace(driven, truth=None))
     with pytest.raises(InputError, match="case drive with true poses"):
-        track_case(blind, AmclConfig(), 0)
+        TrackTask(blind, AmclConfig(), 0)()
 
 
 def test_the_document_has_the_agreed_keys_and_is_json(run: TrackRun) -> None:
-    document = track_document([run, TrackRun("still", None, (), None)])
+    document = track_document([run, TrackRun("still", "recorded", None, (), None)])
     (row,) = document["cases"]
     assert list(row) == KEYS
     assert list(document["total"]) == [*KEYS, "all_kept"]
@@ -90,7 +96,7 @@ def test_a_first_scan_without_truth_is_waited_for(drive_case: Case, driven: Reco
     truth = driven.truth.copy()
     truth[:3] = np.nan
     late = replace(drive_case, recording=lambda: replace(driven, truth=truth))
-    run = track_case(late, AmclConfig(), 0)
+    run = TrackTask(late, AmclConfig(), 0)()
     assert run.figures is not None
     assert run.figures.n == len(driven) - 3
     assert len(run.notes) == 1

@@ -17,11 +17,11 @@ from firstfix.core.pose_error import PoseError
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.config import Method
-from firstfix.lab.experiments.case_runs import CaseRun
+from firstfix.lab.experiments.locate_bench import CaseRun
 from firstfix.lab.metrics.outcome import NO_POSE, Outcome
-from firstfix.lab.reports.document import bench_document
+from firstfix.lab.reports.locate_document import bench_document
+from firstfix.lab.reports.locate_report import write_report
 from firstfix.lab.reports.map_picture import draw_grid
-from firstfix.lab.reports.report import write_report
 from firstfix.plots.answer_picture import draw_answer
 from firstfix.plots.figure import new_figure
 from firstfix.plots.map_image import GREY_FREE, GREY_UNKNOWN, GREY_WALL, draw_map, greys
@@ -94,10 +94,10 @@ def test_a_report_has_a_table_and_two_plots(tmp_path: Path) -> None:
     hit = Outcome(0, Verdict.UNIQUE, PoseError(0.02, 0.001), 1, 0.03, 0.04, 0.99)
     lost = Outcome(2, Verdict.NO_MATCH, NO_POSE, None, 0.01, 0.02, 0.0)
     runs = [
-        CaseRun("a", "a", "sim", method, (hit, lost), 100.0, 0.5, 200.0)
+        CaseRun("a", "a", "sim", "recorded", method, (hit, lost), 100.0, 0.5, 200.0)
         for method in (Method.FAST, Method.PAPER)
     ]
-    document = bench_document(runs, [], [Method.FAST, Method.PAPER])
+    document = bench_document(runs)
     page = write_report(runs, document, tmp_path / "report")
     assert page == (tmp_path / "report" / "report.md").resolve()
     text = page.read_text(encoding="utf-8")

@@ -9,7 +9,7 @@ import pytest
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.lab.reports.scenario_picture import draw_scenario
-from firstfix.lab.scenarios.episodes import DemoStep
+from firstfix.lab.scenarios.demo import DemoStep
 from firstfix.localizer.precompile import small_room
 
 
@@ -18,7 +18,7 @@ def story() -> list[DemoStep]:
         pose = SE2(1.0 + 0.1 * i, 2.0 + episode, 0.0)
         found = pose if i == 0 else None
         return DemoStep(
-            i + 10.0 * episode, pose, pose if published else None, found, "", "", episode, False, 0
+            i + 10.0 * episode, pose, pose if published else None, found, episode, False, 0
         )
 
     return [step(i, episode, published=i % 4 != 3) for episode in range(3) for i in range(12)]
@@ -35,9 +35,7 @@ def test_a_story_is_drawn(tmp_path: Path) -> None:
 
 
 def test_a_story_without_any_pose_is_drawn(tmp_path: Path) -> None:
-    steps = [
-        DemoStep(0.1 * i, SE2(2.0, 2.0, 0.0), None, None, "", "", 0, False, 0) for i in range(3)
-    ]
+    steps = [DemoStep(0.1 * i, SE2(2.0, 2.0, 0.0), None, None, 0, False, 0) for i in range(3)]
     assert draw_scenario(small_room(), steps, tmp_path / "none.png").exists()
 
 

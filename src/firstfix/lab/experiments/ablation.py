@@ -37,11 +37,12 @@ from firstfix.global_localization.search import Candidates, search
 from firstfix.global_localization.verdict import judge, nothing_to_match, place_probabilities
 from firstfix.global_localization.verify import verified_place, verify
 from firstfix.lab.experiments.case import Case, evenly_spaced, known_truth
-from firstfix.lab.experiments.case_runs import try_scan
+from firstfix.lab.experiments.locate_bench import try_scan
+from firstfix.lab.experiments.machine import this_machine
 from firstfix.lab.metrics.metrics import summarize, total
 from firstfix.lab.metrics.outcome import Outcome
-from firstfix.lab.reports.tables import Row, columns_table
-from firstfix.localizer.precompile import scan_of, small_room
+from firstfix.lab.reports.text import Row, columns_table
+from firstfix.localizer.precompile import precompile
 
 # Title, key in the document, format.
 COLUMNS = (
@@ -182,10 +183,7 @@ class AblationTask:
 
     def __call__(self) -> tuple[AblationRun, ...]:
         """Run in this process."""
-        room = small_room()
-        AblatedMatcher(MapFields(room), Without.NOTHING).locate(
-            scan_of(room, SE2(3.0, 2.5, 0.4))  # compiles all kernels
-        )
+        precompile()
         return ablate_case(self.case, self.case.grid(), self.limit)
 
 
@@ -220,10 +218,11 @@ def ablate_case(case: Case, grid: OccupancyGrid, limit: int) -> tuple[AblationRu
 
 
 def ablation_document(runs: Sequence[AblationRun]) -> dict[str, Any]:
-    """Put runs into the document described above, without ``machine``."""
+    """Put runs into the document described above."""
     kinds = list(dict.fromkeys(run.kind for run in runs))
     return {
         "suite": "ablation",
+        "machine": this_machine(),
         "rows": [
             _row(kind, without, [r for r in runs if r.kind == kind and r.without is without])
             for kind in kinds

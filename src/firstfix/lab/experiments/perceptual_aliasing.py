@@ -1,18 +1,30 @@
-"""Which places of a map look alike to a sensor: scans from known places, and what came of them."""
+"""Perceptual aliasing: which places of a map look alike to a sensor."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
 from firstfix.core.estimate import Hypothesis, LocateResult, Verdict
+from firstfix.core.grid import OccupancyGrid
 from firstfix.core.pose_error import PoseError
 from firstfix.core.se2 import SE2
+from firstfix.fields.cache import cache_folder
+from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.global_localization.searchable import check_searchable
 from firstfix.lab.metrics.outcome import FOUND
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import random_free_poses
 
 # A rival less likely than this is not what made the verdict AMBIGUOUS.
 PLAUSIBLE = 0.05
+
+# Surveyed walls and a good sensor: what still looks alike is a property of the map.
+_SIGMA_M = 0.01
 
 
 class Look(Enum):
@@ -41,6 +53,45 @@ class Place:
     pose: SE2
     look: Look
     double: Hypothesis | None
+
+
+def sensor(beams: int, fov_deg: float, range_m: float) -> Lidar:
+    """Return a sensor without dropouts and nearly without noise."""
+    return Lidar(beams=beams, fov=math.radians(fov_deg), range_max=range_m, sigma_m=_SIGMA_M)
+
+
+def survey(
+    grid: OccupancyGrid, lidar: Lidar, samples: int, seed: int, done: Callable[[str], None]
+) -> list[Place]:
+    """Locate simulated scans from random places of a map.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+    lidar : Lidar
+        The sensor.
+    samples : int
+        Number of places.
+    seed : int
+        Of places and noise.
+    done : callable
+        Takes the result at every place, in words.
+
+    Raises
+    ------
+    MapError
+        If nothing can be located in the map.
+    """
+    check_searchable(grid)
+    rng = np.random.default_rng(seed)
+    poses = random_free_poses(grid, rng, samples)
+    matcher = ScanMatcher(grid, cache_dir=cache_folder())
+    places = []
+    for pose in poses:
+        places.append(look_from(pose, matcher.locate(lidar.scan(grid, pose, rng))))
+        done(places[-1].look.value)
+    return places
 
 
 def look_from(pose: SE2, result: LocateResult) -> Place:

@@ -19,16 +19,23 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from firstfix.core.estimate import LocateResult
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.config import Method
 from firstfix.global_localization.scan_matcher import ScanMatcher
-from firstfix.lab.experiments.case_runs import compile_kernels, try_scan
+from firstfix.lab.experiments.locate_bench import try_scan
+from firstfix.lab.experiments.machine import this_machine
 from firstfix.lab.experiments.process_pool import peak_rss_mb
 from firstfix.lab.metrics.metrics import summarize
-from firstfix.lab.reports.tables import Row, columns_table
+from firstfix.lab.reports.text import Row, columns_table
+from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.worlds.catalog import random_free_poses
+from firstfix.lab.worlds.many_offices import many_offices
+from firstfix.localizer.precompile import precompile
 
 # Title, key in the document, format.
 COST_COLUMNS = (
@@ -54,6 +61,16 @@ THREAD_COLUMNS = (
     ("speed-up", "speedup", ".2f"),
     ("CPU s a scan", "cpu_s_per_scan", ".3f"),
 )
+
+# Offices of 42 x 27 m: 1 134 to 113 400 m².
+OFFICES = (1, 3, 10, 32, 100)
+BEAMS = (100, 200, 360, 720, 1000, 2000)
+THREADS = (1, 2)
+
+# Maps in which beams and threads are varied, in offices.
+_VARIED = (1, 10)
+_SCANS = 12
+_USUAL_BEAMS = 360
 
 # Of so many runs the fastest counts: what else a machine does only makes it slower.
 _REPEATS = 7
@@ -117,7 +134,7 @@ class CostTask:
 
     def __call__(self) -> tuple[Cost, ...]:
         """Run in this process, one group after another."""
-        compile_kernels(self.method)
+        precompile(methods=[self.method])
         grid = _fresh(self.grid)
         before_mb = peak_rss_mb()
         start = time.process_time()
@@ -167,7 +184,7 @@ class ThroughputTask:
 
     def __call__(self) -> tuple[Throughput, ...]:
         """Run in this process; numbers of threads take turns, so that all see the same load."""
-        compile_kernels(Method.FAST)
+        precompile()
         matcher = ScanMatcher(_fresh(self.grid), cache_dir=None)
         scans = [sighting.scan for sighting in self.sightings]
         walls: dict[int, list[float]] = {n: [] for n in self.threads}
@@ -214,17 +231,43 @@ def locate_in_threads(
         return list(pool.map(matcher.locate, scans))
 
 
+def scaling_tasks(
+    seed: int, offices: Sequence[int] = OFFICES, beams: Sequence[int] = BEAMS
+) -> list[tuple[str, CostTask | ThroughputTask]]:
+    """List what to measure, each with the list of the document that its result belongs to.
+
+    Parameters
+    ----------
+    seed : int
+        Of furniture, places and noise.
+    offices : sequence of int
+        Sizes of the maps, in offices.
+    beams : sequence of int
+        Numbers of beams, varied in some of the maps.
+    """
+    tasks: list[tuple[str, CostTask | ThroughputTask]] = []
+    for count in offices:
+        rng = np.random.default_rng(seed)
+        grid = many_offices(count, rng)
+        usual = _sightings(grid, _USUAL_BEAMS, rng)
+        methods = (Method.FAST, Method.PAPER)
+        tasks += [("area", CostTask(grid, method, (usual,))) for method in methods]
+        if count in _VARIED and beams:
+            groups = tuple(_sightings(grid, n, rng) for n in beams)
+            tasks += [("beams", CostTask(grid, method, groups)) for method in methods]
+            tasks.append(("threads", ThroughputTask(grid, usual, THREADS)))
+    return tasks
+
+
 def scaling_document(
-    area: Sequence[Cost], beams: Sequence[Cost], threads: Sequence[Throughput], seed: int
+    measured: Sequence[tuple[str, Sequence[Cost | Throughput]]], seed: int
 ) -> dict[str, Any]:
-    """Put figures into the document described above, without ``machine``."""
-    return {
-        "suite": "scaling",
-        "seed": seed,
-        "area": [asdict(cost) for cost in area],
-        "beams": [asdict(cost) for cost in beams],
-        "threads": [asdict(throughput) for throughput in threads],
+    """Put the results of `scaling_tasks`, each with its list, into the document described above."""
+    lists = {
+        name: [asdict(row) for part, rows in measured if part == name for row in rows]
+        for name in ("area", "beams", "threads")
     }
+    return {"suite": "scaling", "seed": seed, **lists, "machine": this_machine()}
 
 
 def cost_table(rows: Sequence[Row]) -> str:
@@ -236,6 +279,12 @@ def cost_table(rows: Sequence[Row]) -> str:
 def threads_table(rows: Sequence[Row]) -> str:
     """Lay out rows of ``threads`` in Markdown."""
     return columns_table(rows, {}, THREAD_COLUMNS)
+
+
+def _sightings(grid: OccupancyGrid, beams: int, rng: np.random.Generator) -> tuple[Sighting, ...]:
+    lidar = Lidar(beams=beams)
+    poses = random_free_poses(grid, rng, _SCANS)
+    return tuple(Sighting(lidar.scan(grid, pose, rng), pose) for pose in poses)
 
 
 def _fresh(grid: OccupancyGrid) -> OccupancyGrid:

@@ -2,32 +2,30 @@
 
 The JSON document::
 
-    {"cases": [{"name", "n", "updates", "ape_rmse_m", "ape_rmse_deg", "ape_median_m", "ape_max_m",
-                "kept", "cpu_update_ms", "cpu_update_ms_p95", "particles_mean", "rss_mb",
-                "rpe_rmse_m", "rpe_rmse_deg"}, ...],
+    {"cases": [{"name", "sensor", "n", "updates", "ape_rmse_m", "ape_rmse_deg",
+                "ape_median_m", "ape_max_m", "kept", "cpu_update_ms", "cpu_update_ms_p95",
+                "particles_mean", "rss_mb", "rpe_rmse_m", "rpe_rmse_deg"}, ...],
      "total": {...the same keys..., "all_kept"}}
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from firstfix.amcl.config import AmclConfig
-from firstfix.amcl.initial import around_pose
-from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.lab.experiments.case import Case, known_truth
 from firstfix.lab.experiments.drive import plan_drive
 from firstfix.lab.experiments.drive_tracking import TRUE_START, follow_drive, make_tracker
-from firstfix.lab.experiments.process_pool import peak_rss_mb, run_in_processes
+from firstfix.lab.experiments.process_pool import peak_rss_mb
 from firstfix.lab.metrics.metrics import mean_of_known
 from firstfix.lab.metrics.track_metrics import TrackFigures, summarize_track
-from firstfix.lab.reports.tables import Row, columns_table
-from firstfix.localizer.precompile import scan_of, small_room
+from firstfix.lab.reports.text import Row, columns_table
+from firstfix.localizer.precompile import precompile
 
 COUNTS = frozenset({"n", "updates"})
 
@@ -55,8 +53,8 @@ class TrackRun:
 
     Parameters
     ----------
-    case : str
-        Its name.
+    case, sensor : str
+        Its name, and the sensor that its scans are cut to.
     figures : TrackFigures or None
         How well; None where the case has no odometry and was left out.
     notes : tuple of str
@@ -66,6 +64,7 @@ class TrackRun:
     """
 
     case: str
+    sensor: str
     figures: TrackFigures | None
     notes: tuple[str, ...]
     rss_mb: float | None
@@ -80,58 +79,33 @@ class TrackTask:
     seed: int
 
     def __call__(self) -> TrackRun:
-        """Run in this process."""
-        return track_case(self.case, self.config, self.seed)
+        """Run in this process; without figures if the case has no odometry.
 
-
-def track_case(case: Case, config: AmclConfig, seed: int) -> TrackRun:
-    """Follow a case from its first true pose, in this process.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    config : AmclConfig
-        Settings of the dynamic stage.
-    seed : int
-        Of all randomness.
-
-    Returns
-    -------
-    TrackRun
-        The case in figures; without them where it has no odometry.
-
-    Raises
-    ------
-    InputError
-        If the case cannot be loaded or has no truth.
-    """
-    recording = case.recording()
-    if recording.odometry is None:
-        return TrackRun(case.name, None, ("no odometry",), peak_rss_mb())
-    known_truth(case, recording)
-    grid, drive = case.grid(), plan_drive(recording, None)
-    _compile_kernels(config)
-    tracker, rng = make_tracker(grid, config), np.random.default_rng(seed)
-    fields = MapFields(grid)
-    fields.compute("squares", "clearance")  # not part of the first scan's time
-    figures = summarize_track([*follow_drive(drive, tracker, config, TRUE_START, rng, fields)])
-    return TrackRun(case.name, figures, drive.notes, peak_rss_mb())
-
-
-def run_track_tasks(
-    tasks: Sequence[TrackTask], jobs: int, on_done: Callable[[TrackRun], None]
-) -> list[TrackRun]:
-    """Follow cases, each in a process of its own; arguments as those of `run_tasks`."""
-    return run_in_processes(tasks, jobs, lambda _, run: on_done(run))
+        Raises
+        ------
+        InputError
+            If the case cannot be loaded or has no true pose.
+        """
+        case, recording = self.case, self.case.recording()
+        if recording.odometry is None:
+            return TrackRun(case.name, case.sensor, None, ("no odometry",), peak_rss_mb())
+        known_truth(case, recording)
+        grid, drive = case.grid(), plan_drive(recording, None)
+        precompile(self.config)
+        tracker, rng = make_tracker(grid, self.config), np.random.default_rng(self.seed)
+        fields = MapFields(grid)
+        fields.compute("squares", "clearance")  # not part of the first scan's time
+        tracked = follow_drive(drive, tracker, self.config, TRUE_START, rng, fields)
+        figures = summarize_track([*tracked])
+        return TrackRun(case.name, case.sensor, figures, drive.notes, peak_rss_mb())
 
 
 def track_document(runs: Sequence[TrackRun]) -> dict[str, Any]:
     """Put the cases that were followed, at least one, into the document described above."""
-    rows = [_row(run.case, run.figures, run.rss_mb) for run in runs if run.figures is not None]
-    total: dict[str, Any] = {"name": "total"}
+    rows = [_row(run, run.figures) for run in runs if run.figures is not None]
+    total: dict[str, Any] = {"name": "total", "sensor": "all"}
     for key in rows[0]:
-        if key != "name":
+        if key not in total:
             values = [row[key] for row in rows]
             total[key] = sum(values) if key in COUNTS else mean_of_known(values)
     total["all_kept"] = sum(row["kept"] == 1.0 for row in rows)
@@ -140,13 +114,16 @@ def track_document(runs: Sequence[TrackRun]) -> dict[str, Any]:
 
 def track_table(document: Row) -> str:
     """Lay out cases and total of the document, in Markdown that is aligned in plain text too."""
-    return columns_table([*document["cases"], document["total"]], {"case": "name"}, COLUMNS)
+    return columns_table(
+        [*document["cases"], document["total"]], {"case": "name", "sensor": "sensor"}, COLUMNS
+    )
 
 
-def _row(name: str, figures: TrackFigures, rss_mb: float | None) -> dict[str, Any]:
+def _row(run: TrackRun, figures: TrackFigures) -> dict[str, Any]:
     ape, rpe = figures.ape, figures.rpe
     return {
-        "name": name,
+        "name": run.case,
+        "sensor": run.sensor,
         "n": figures.n,
         "updates": figures.updates,
         "ape_rmse_m": ape and ape.rmse_m,
@@ -157,16 +134,7 @@ def _row(name: str, figures: TrackFigures, rss_mb: float | None) -> dict[str, An
         "cpu_update_ms": figures.cpu_update_ms,
         "cpu_update_ms_p95": figures.cpu_update_ms_p95,
         "particles_mean": figures.particles_mean,
-        "rss_mb": rss_mb,
+        "rss_mb": run.rss_mb,
         "rpe_rmse_m": rpe and rpe.rmse_m,
         "rpe_rmse_deg": rpe and rpe.rmse_deg,
     }
-
-
-def _compile_kernels(config: AmclConfig) -> None:
-    """Update in a small room, moving and at rest."""
-    grid, rng, here = small_room(), np.random.default_rng(0), SE2(3.0, 2.5, 0.4)
-    tracker, scan = make_tracker(grid, config), scan_of(grid, here)
-    particles = around_pose(here, TRUE_START, config.max_particles, rng)
-    track = tracker.begin(particles, SE2.identity(), scan, rng)
-    tracker.update(track, SE2(0.3, 0.0, 0.2), scan, rng)

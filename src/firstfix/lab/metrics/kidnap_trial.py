@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from firstfix.core.estimate import Hypothesis
 from firstfix.core.pose_error import PoseError
 from firstfix.core.se2 import SE2
 
@@ -53,6 +54,8 @@ class Instant:
         The pose that it gave for this scan.
     fixes : tuple of SE2
         Poses at which it said to have found the robot, at the start or anew.
+    places : tuple of Hypothesis or None
+        The places that it reported for this scan.
     said : tuple of str
         Its words, for a person.
     cpu_s : float
@@ -69,6 +72,7 @@ class Instant:
     localized: bool = False
     published: SE2 | None = None
     fixes: tuple[SE2, ...] = ()
+    places: tuple[Hypothesis, ...] | None = None
     said: tuple[str, ...] = ()
     cpu_s: float = 0.0
 

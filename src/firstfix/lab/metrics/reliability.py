@@ -1,8 +1,8 @@
 """Whether a probability is worth its name, and how much can be answered at how little risk.
 
-For the JSON document of ``bench``, one entry for each method and kind of case::
+For the JSON document of ``bench``, one entry for each method, sensor and kind of case::
 
-    {"method", "kind", "n", "wrong_map_n",
+    {"method", "sensor", "kind", "n", "wrong_map_n",
      "bins": [{"from", "to", "n", "claimed", "right", "right_low", "right_high"}, ...],
      "own": {"unique_coverage", "unique_risk", "coverage_at_goal_risk", "risk_at_goal_coverage",
              "curve": {"threshold": [...], "coverage": [...], "risk": [...]}},
@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.global_localization.config import LocateConfig
-from firstfix.lab.experiments.case_runs import CaseRun, WrongMapRun
-from firstfix.lab.reports.tables import Row, columns_table
+from firstfix.lab.experiments.locate_bench import CaseRun, WrongMapRun
+from firstfix.lab.reports.text import Row, columns_table
 
 GOAL_RISK = 0.003
 GOAL_COVERAGE = 0.88
@@ -154,7 +154,7 @@ def reliability_bins(
 def reliability_document(
     runs: Sequence[CaseRun], wrong_map: Sequence[WrongMapRun]
 ) -> list[dict[str, Any]]:
-    """Put all scans of a method and kind into figures, as described above.
+    """Put all scans of a method, sensor and kind into figures, as described above.
 
     Parameters
     ----------
@@ -166,29 +166,31 @@ def reliability_document(
     Returns
     -------
     list of dict
-        One for each method and kind; scans count alike, whatever case they are of.
+        One for each method, sensor and kind; scans count alike, whatever case they are of.
     """
-    keys = dict.fromkeys((run.method, run.kind) for run in runs)
+    keys = dict.fromkeys(_key(run) for run in runs)
     return [
-        _entry(
-            [run for run in runs if (run.method, run.kind) == key],
-            [run for run in wrong_map if (run.method, run.kind) == key],
-        )
+        _entry([r for r in runs if _key(r) == key], [r for r in wrong_map if _key(r) == key])
         for key in keys
     ]
 
 
 def reliability_table(entries: Sequence[Row]) -> str:
-    """Lay out coverage and risk of every method and kind, without and with wrong-map scans."""
+    """Lay out coverage and risk by method, sensor and kind, without and with wrong maps."""
     rows = []
     for entry in entries:
-        words = {"method": entry["method"], "kind": entry["kind"]}
+        words = {key: entry[key] for key in ("method", "sensor", "kind")}
         rows.append({**words, **entry["own"], "scans": entry["n"]})
         if entry["with_wrong_map"] is not None:
             words["kind"] += " and wrong map"
             scans = entry["n"] + entry["wrong_map_n"]
             rows.append({**words, **entry["with_wrong_map"], "scans": scans})
-    return columns_table(rows, {"method": "method", "scans of": "kind"}, COLUMNS)
+    titles = {"method": "method", "sensor": "sensor", "scans of": "kind"}
+    return columns_table(rows, titles, COLUMNS)
+
+
+def _key(run: CaseRun | WrongMapRun) -> tuple[str, str, str]:
+    return run.method.value, run.sensor, run.kind
 
 
 def _entry(runs: Sequence[CaseRun], wrong_map: Sequence[WrongMapRun]) -> dict[str, Any]:
@@ -199,6 +201,7 @@ def _entry(runs: Sequence[CaseRun], wrong_map: Sequence[WrongMapRun]) -> dict[st
     nowhere = np.empty(0)
     return {
         "method": runs[0].method.value,
+        "sensor": runs[0].sensor,
         "kind": runs[0].kind,
         "n": len(outcomes),
         "wrong_map_n": len(elsewhere),

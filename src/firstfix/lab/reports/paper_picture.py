@@ -15,8 +15,8 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.scoring import classify_beams
-from firstfix.lab.experiments.starts import Attempt, Belief, Start
 from firstfix.lab.metrics.outcome import is_found
+from firstfix.lab.metrics.paper_trial import Attempt, Belief, Start
 from firstfix.plots.answer_picture import BEAM_COLOURS, ROBOT_M
 from firstfix.plots.figure import BLUE, GREEN, RED, SKY, new_figure, save_figure
 from firstfix.plots.map_image import draw_map

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from firstfix.lab.metrics.reliability import GOAL_COVERAGE, GOAL_RISK
-from firstfix.lab.reports.tables import Row
+from firstfix.lab.reports.text import Row
 from firstfix.plots.figure import PALETTE, new_figure, save_figure
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def save_reliability(entries: Sequence[Row], path: Path) -> Path:
     figure = new_figure(11.0, 5.0)
     diagram, curves = figure.subplots(1, 2)
     for entry, colour in zip(entries, PALETTE, strict=False):
-        label = f"{entry['method']}, {entry['kind']} ({entry['n']} scans)"
+        label = f"{entry['method']}, {entry['sensor']}, {entry['kind']} ({entry['n']} scans)"
         _draw_bins(diagram, entry, colour, label)
         _draw_curve(curves, entry["own"]["curve"], colour, "-", label)
         if entry["with_wrong_map"] is not None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.lab.scenarios.episodes import DemoStep
+from firstfix.lab.scenarios.demo import DemoStep
 from firstfix.plots.figure import BLUE, GREEN, RED, new_figure, save_figure
 from firstfix.plots.map_image import draw_map
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from firstfix.lab.experiments.ablation import ablation_table
 from firstfix.lab.experiments.machine import machine_text
 from firstfix.lab.experiments.scaling import cost_table, threads_table
-from firstfix.lab.reports.page import write_page
-from firstfix.lab.reports.tables import Row
+from firstfix.lab.reports.output_files import write_page
+from firstfix.lab.reports.text import Row
 from firstfix.plots.figure import PALETTE, new_figure, number_plainly, save_figure
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ THREADS = (
 
 
 def write_ablation_report(document: dict[str, Any], folder: Path) -> Path:
-    """Write ``report.md`` into a folder, which must be there; returns it, absolute."""
+    """Write ``report.md`` into a folder and return it; see `write_page`."""
     return write_page(
         [
             "# firstfix bench --suite ablation",
@@ -53,25 +53,7 @@ def write_ablation_report(document: dict[str, Any], folder: Path) -> Path:
 
 
 def write_scaling_report(document: dict[str, Any], folder: Path) -> Path:
-    """Write ``report.md`` with its plots into a folder, which is made where it is missing.
-
-    Parameters
-    ----------
-    document : dict
-        From `scaling_document`, with ``machine``.
-    folder : Path
-        Where the report goes; its files are replaced.
-
-    Returns
-    -------
-    Path
-        ``report.md``, absolute.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written, or matplotlib is not installed.
-    """
+    """Write ``report.md`` with its plot into a folder and return it; see `write_page`."""
     save_scaling(document, folder / "scaling.png")
     return write_page(
         [

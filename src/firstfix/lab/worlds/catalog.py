@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from firstfix.core.errors import InputError, MapError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.fields.clearance import chessboard_clearance
+from firstfix.io.maps.map_server import load_map
 from firstfix.lab.worlds.corridor import corridor
 from firstfix.lab.worlds.drawing import MARGIN, RESOLUTION, Drawing
 from firstfix.lab.worlds.house import house
@@ -113,3 +115,41 @@ WORLDS: dict[str, Callable[[], OccupancyGrid]] = {
     "house": house,
     "corridor": corridor,
 }
+
+
+def parse_worlds(text: str, known: Collection[str]) -> list[str]:
+    """Read names of worlds, separated by commas; each is returned once.
+
+    Raises
+    ------
+    InputError
+        If one of them is not in ``known``.
+    """
+    names = list(dict.fromkeys(name.strip() for name in text.split(",")))
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise InputError(
+            expected=f"--worlds of {', '.join(known)}",
+            received=", ".join(repr(name) for name in unknown),
+            remedy="separate names by commas, as in --worlds office,house",
+        )
+    return names
+
+
+def world_or_map(name: str) -> OccupancyGrid:
+    """Draw a built-in world, or load a map by the path of its YAML.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or the map cannot be used.
+    """
+    if name in WORLDS:
+        return WORLDS[name]()
+    if not Path(name).exists():
+        raise InputError(
+            expected=f"the YAML of a map, or a built-in world ({', '.join(WORLDS)})",
+            received=f"no such file: {name}",
+            remedy="check the path or the name",
+        )
+    return load_map(Path(name))

@@ -1,56 +1,19 @@
-"""A benchmark as a Markdown table, for a terminal and for a report alike."""
+"""Tables and poses as text, for terminals and for reports."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from firstfix.core.se2 import SE2
+
 Row = Mapping[str, Any]
 
-# Title, key in the document, format.
-COLUMNS = (
-    ("n", "n", ".0f"),
-    ("success", "success", ".1%"),
-    ("0.2 m 3°", "success_02", ".1%"),
-    ("recall@10", "recall_10", ".1%"),
-    ("unique", "unique", ".1%"),
-    ("right", "unique_right", ".1%"),
-    ("wrong", "wrong_unique", ".0f"),
-    ("median m", "median_m", ".3f"),
-    ("median °", "median_deg", ".2f"),
-    ("p95 m", "p95_m", ".3f"),
-    ("CPU s", "cpu_s", ".3f"),
-    ("p95 CPU s", "cpu_s_p95", ".3f"),
-    ("wall s", "wall_s", ".3f"),
-    ("prepare s", "prepare_s", ".2f"),
-    ("RSS MB", "rss_mb", ".0f"),
-)
 
-
-def bench_table(document: Row) -> str:
-    """Lay out cases and totals of a benchmark.
-
-    Parameters
-    ----------
-    document : mapping
-        From `bench_document`.
-
-    Returns
-    -------
-    str
-        Markdown; the numbers are aligned in plain text too.
-    """
-    rows = [*document["cases"], *document["totals"]]
-    return columns_table(rows, {"case": "name", "method": "method"}, COLUMNS)
-
-
-def wrong_map_table(document: Row) -> str:
-    """Lay out the scans that were tried on maps of other buildings."""
-    cells = [
-        [f["name"], f["on"], f["method"], str(f["n"]), str(f["unique"])]
-        for f in document["wrong_map_cases"]
-    ]
-    return markdown_table(["scans of", "on the map of", "method", "n", "unique (all wrong)"], cells)
+def pose_text(pose: SE2) -> str:
+    """Write a pose for a person."""
+    return f"x {pose.x:.3f} m, y {pose.y:.3f} m, yaw {math.degrees(pose.yaw):.2f}°"
 
 
 def columns_table(

@@ -9,18 +9,22 @@ import pytest
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.lab.experiments.machine import this_machine
-from firstfix.lab.experiments.paper_suite import (
+from firstfix.lab.metrics.paper_trial import (
+    NO_CLOUD,
+    Attempt,
+    Belief,
     Ending,
-    details_table,
+    Start,
     judge_attempt,
+)
+from firstfix.lab.reports.paper_picture import Shown, draw_starts
+from firstfix.lab.reports.paper_report import (
+    details_table,
     paper_document,
     paper_table,
     worlds_table,
+    write_paper_report,
 )
-from firstfix.lab.experiments.starts import NO_CLOUD, Attempt, Belief, Start
-from firstfix.lab.reports.paper_picture import Shown, draw_starts
-from firstfix.lab.reports.paper_report import write_paper_report
 
 AWAY = SE2(-3.0, 1.0, 0.0)
 
@@ -81,7 +85,7 @@ def document() -> dict[str, object]:
             ("house", 0, Start.FAST, "---------"),
         )
     ]
-    return paper_document(trials, 0, 8.0) | {"machine": this_machine()}
+    return paper_document(trials, 0, 8.0)
 
 
 def test_worlds_and_ways_are_counted(document: dict) -> None:

@@ -17,8 +17,8 @@ from firstfix.lab.experiments.drive_tracking import (
     follow_drive,
     make_tracker,
 )
-from firstfix.lab.reports import track_picture
-from firstfix.lab.reports.track_picture import anchored_odometry, draw_track, end_points
+from firstfix.lab.reports import track_report
+from firstfix.lab.reports.track_report import anchored_odometry, draw_track, end_points
 
 
 @pytest.fixture(scope="module")
@@ -65,8 +65,8 @@ def test_end_points_lie_on_walls_where_the_track_is_right(
 def test_large_drives_are_thinned(
     tracked: list[TrackedScan], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(track_picture, "MOST_SCANS", 10)
-    monkeypatch.setattr(track_picture, "MOST_POINTS", 300)
+    monkeypatch.setattr(track_report, "MOST_SCANS", 10)
+    monkeypatch.setattr(track_report, "MOST_POINTS", 300)
     assert 100 < len(end_points(tracked)) <= 300
 
 

@@ -1,26 +1,27 @@
-"""Where results go: refused before the work, not after it, where they could not be written."""
+"""Files and folders for results: checked before the work, written whole after it."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from firstfix.core.errors import InputError
 from firstfix.io.atomic_files import write_whole
+from firstfix.plots.figure import check_path, new_figure
 
 
 def check_file(path: Path) -> None:
-    """Refuse a file that could not be written; make its folder where it is missing.
+    """Refuse a file that cannot be written; create its folder if it is missing.
 
-    What an existing file holds stays until there is something new.
+    An existing file keeps its content.
 
     Raises
     ------
     InputError
-        If it could not be written.
+        If it cannot be written.
     """
     with _writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -30,34 +31,20 @@ def check_file(path: Path) -> None:
             path.unlink()
 
 
-def check_folder(path: Path) -> None:
-    """Make a folder for results, or refuse it as `check_file` does."""
-    with _writing(path):
-        path.mkdir(parents=True, exist_ok=True)
-
-
 def check_picture(path: Path) -> None:
-    """Refuse a picture that could not be drawn, or not be written under this name."""
-    from firstfix.plots.figure import check_path
-
+    """Refuse a picture whose format is unknown, or any picture where matplotlib is missing."""
     check_path(path)
-    check_plots()
-
-
-def check_plots() -> None:
-    """Say now, not after the work, that matplotlib is missing."""
-    from firstfix.plots.figure import new_figure
-
     new_figure(1.0, 1.0)
 
 
 def check_targets(json_file: Path | None, report: Path | None) -> None:
-    """Refuse before hours of work what could not be written after them."""
+    """Refuse before hours of work what cannot be written after them; create the report's folder."""
     if json_file is not None:
         check_file(json_file)
     if report is not None:
-        check_plots()
-        check_folder(report)
+        new_figure(1.0, 1.0)
+        with _writing(report):
+            report.mkdir(parents=True, exist_ok=True)
 
 
 def write_json(document: dict[str, Any], path: Path) -> None:
@@ -65,6 +52,32 @@ def write_json(document: dict[str, Any], path: Path) -> None:
     text = json.dumps(document, indent=2, allow_nan=False)
     with _writing(path):
         write_whole(path, [text.encode(), b"\n"])
+
+
+def write_page(parts: Sequence[str], folder: Path) -> Path:
+    """Write ``report.md`` into an existing folder.
+
+    Parameters
+    ----------
+    parts : sequence of str
+        Headings, paragraphs, tables and pictures, in Markdown.
+    folder : Path
+        An earlier report in it is replaced.
+
+    Returns
+    -------
+    Path
+        ``report.md``, absolute.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    page = folder / "report.md"
+    with _writing(folder):
+        page.write_text("\n\n".join(part.strip() for part in parts) + "\n", encoding="utf-8")
+    return page.resolve()
 
 
 @contextmanager

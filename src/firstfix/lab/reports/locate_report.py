@@ -8,14 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from firstfix.global_localization.config import Method
-from firstfix.lab.experiments.case_runs import CaseRun
+from firstfix.lab.experiments.locate_bench import CaseRun
 from firstfix.lab.experiments.machine import machine_text
 from firstfix.lab.metrics.outcome import FOUND
 from firstfix.lab.metrics.reliability import reliability_table
-from firstfix.lab.reports.page import write_page
+from firstfix.lab.reports.locate_document import (
+    bench_table,
+    buildings_table,
+    sensors_table,
+    wrong_map_table,
+)
+from firstfix.lab.reports.output_files import write_page
 from firstfix.lab.reports.reliability_picture import save_reliability
-from firstfix.lab.reports.tables import bench_table, wrong_map_table
 from firstfix.plots.figure import (
     PALETTE,
     line_style,
@@ -36,6 +40,11 @@ LEGEND = (
     "Errors are those of the successes. Times are of `locate` alone, one scan."
 )
 
+BUILDINGS = (
+    "Every scan counts alike. A building is out of sample if no constant of the verdict was chosen "
+    "with its scans."
+)
+
 RELIABILITY = (
     "Left: of the scans for whose best place a probability was claimed, so many are right (bars: "
     "95 % intervals; small numbers: scans). Right: if everything from a probability on is "
@@ -46,27 +55,7 @@ RELIABILITY = (
 
 
 def write_report(runs: Sequence[CaseRun], document: dict[str, Any], folder: Path) -> Path:
-    """Write ``report.md`` with its plots into a folder, which is made where it is missing.
-
-    Parameters
-    ----------
-    runs : sequence of CaseRun
-        Cases on their own maps.
-    document : dict
-        Their figures, from `bench_document`.
-    folder : Path
-        Where the report goes; its files are replaced.
-
-    Returns
-    -------
-    Path
-        ``report.md``, absolute.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written, or matplotlib is not installed.
-    """
+    """Write ``report.md`` with its plots into a folder and return it; see `write_page`."""
     save_error_curves(runs, folder / "error_curves.png")
     save_times(runs, folder / "time_by_area.png")
     save_reliability(document["reliability"], folder / "reliability.png")
@@ -75,17 +64,17 @@ def write_report(runs: Sequence[CaseRun], document: dict[str, Any], folder: Path
 
 def save_error_curves(runs: Sequence[CaseRun], path: Path) -> Path:
     """Plot for every case which share of its scans has at most which position error."""
-    methods = _methods(runs)
-    figure = new_figure(4.0 + 5.0 * len(methods), 6.0)
-    panels = figure.subplots(1, len(methods), squeeze=False, sharey=True)[0]
+    settings = _settings(runs)
+    figure = new_figure(4.0 + 5.0 * len(settings), 6.0)
+    panels = figure.subplots(1, len(settings), squeeze=False, sharey=True)[0]
     names = list(dict.fromkeys(run.case for run in runs))
-    for method, axes in zip(methods, panels, strict=True):
+    for setting, axes in zip(settings, panels, strict=True):
         for run in runs:
-            if run.method is method:
+            if _setting(run) == setting:
                 _error_curve(axes, run, names.index(run.case))
         axes.axvline(FOUND.metres, color="0.5", lw=1, zorder=0)
         axes.set(xscale="log", xlim=(LEAST_M, MOST_M), ylim=(0.0, 1.02))
-        axes.set(title=method.value, xlabel="error of position at most, m")
+        axes.set(title=setting, xlabel="error of position at most, m")
         axes.grid(which="both", alpha=0.25)
     panels[0].set_ylabel("share of scans")
     handles, labels = panels[0].get_legend_handles_labels()
@@ -98,13 +87,13 @@ def save_times(runs: Sequence[CaseRun], path: Path) -> Path:
     figure = new_figure(9.0, 6.0)
     axes = figure.subplots()
     lowest: dict[str, tuple[float, float]] = {}
-    for method, colour, marker in zip(_methods(runs), PALETTE, "osD^v*", strict=False):
-        own = [run for run in runs if run.method is method]
+    for setting, colour, marker in zip(_settings(runs), PALETTE, "osD^v*", strict=False):
+        own = [run for run in runs if _setting(run) == setting]
         area = np.array([run.free_area_m2 for run in own])
         times_ms = [[1e3 * outcome.cpu_s for outcome in run.outcomes] for run in own]
         median, most = (np.array([np.percentile(t, p) for t in times_ms]) for p in (50, 95))
         axes.vlines(area, median, most, color=colour, alpha=0.5, lw=1.5)
-        axes.scatter(area, median, color=colour, marker=marker, label=method.value, zorder=3)
+        axes.scatter(area, median, color=colour, marker=marker, label=setting, zorder=3)
         for run, y in zip(own, median, strict=True):
             x, least = lowest.get(run.site, (run.free_area_m2, y))
             lowest[run.site] = (x, min(least, y))
@@ -128,8 +117,12 @@ def _error_curve(axes: Axes, run: CaseRun, number: int) -> None:
     axes.step(x, y, where="post", **line_style(number), lw=1.3, label=run.case)
 
 
-def _methods(runs: Sequence[CaseRun]) -> list[Method]:
-    return list(dict.fromkeys(run.method for run in runs))
+def _setting(run: CaseRun) -> str:
+    return f"{run.method.value}, {run.sensor}"
+
+
+def _settings(runs: Sequence[CaseRun]) -> list[str]:
+    return list(dict.fromkeys(_setting(run) for run in runs))
 
 
 def _parts(document: dict[str, Any]) -> list[str]:
@@ -138,6 +131,11 @@ def _parts(document: dict[str, Any]) -> list[str]:
         machine_text(document["machine"]),
         LEGEND,
         bench_table(document),
+        "## Sensors",
+        sensors_table(document),
+        "## Buildings",
+        BUILDINGS,
+        buildings_table(document),
     ]
     if document["wrong_map_cases"]:
         parts += ["## Scans on the maps of other buildings", wrong_map_table(document)]

@@ -10,8 +10,16 @@ from firstfix.core.recording import Recording
 from firstfix.core.se2 import SE2
 from firstfix.core.trajectory import Trajectory
 from firstfix.lab.experiments.drive import Drive, plan_drive
-from firstfix.lab.experiments.starts import WORDS, Attempt, Start, attempt
+from firstfix.lab.experiments.paper_bench import (
+    PAPER_WORLDS,
+    at_home,
+    attempt,
+    follow_with_system,
+    simulated_drive,
+)
 from firstfix.lab.metrics.outcome import is_found
+from firstfix.lab.metrics.paper_trial import WORDS, Attempt, Start
+from firstfix.lab.simulation.floor import Floor
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import ROOM_PITCH, identical_rooms
 
@@ -81,3 +89,26 @@ def test_where_places_are_alike_the_default_method_gives_no_pose() -> None:
     spoken = attempt(Start.PAPER, drive, grid, 0).beliefs[-1].T_map_base
     assert spoken is not None
     assert math.remainder(spoken.x - truth[-1].x, ROOM_PITCH) == pytest.approx(0.0, abs=0.3)
+
+
+def test_the_origin_of_every_world_is_a_place_where_a_robot_can_be() -> None:
+    for draw in PAPER_WORLDS.values():
+        assert Floor(at_home(draw())).room_at(0.0, 0.0) > 0.18
+
+
+def test_the_system_lives_through_a_drive(hall_plan: OccupancyGrid, driven: Recording) -> None:
+    lived = follow_with_system(driven, hall_plan)
+    assert lived.start is Start.SYSTEM
+    assert [belief.stamp for belief in lived.beliefs] == [scan.stamp for scan in driven.scans]
+    last = lived.beliefs[-1]
+    assert last.T_map_base is not None
+    assert is_found(last.T_map_base, last.truth)
+    assert len(lived.last_cloud) > 0
+
+
+def test_a_drive_is_as_long_as_asked_for_and_repeats(hall_plan: OccupancyGrid) -> None:
+    once, again = (simulated_drive(hall_plan, 3, 4.0) for _ in range(2))
+    assert len(once) == 40
+    assert once.truth is not None
+    assert again.truth is not None
+    np.testing.assert_array_equal(once.truth, again.truth)

@@ -8,15 +8,15 @@ import pytest
 
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
-from firstfix.lab.experiments.kidnap_bench import (
+from firstfix.lab.metrics.kidnap_trial import Aftermath, Instant, Trial
+from firstfix.lab.reports.kidnap_report import (
     KidnapRun,
     judged_run,
     kidnap_document,
     kidnap_table,
     kinds_table,
+    write_kidnap_report,
 )
-from firstfix.lab.metrics.kidnap_trial import Aftermath, Instant, Trial
-from firstfix.lab.reports.kidnap_report import write_kidnap_report
 
 AGREED = [
     "name", "scenarios", "kidnaps", "signalled", "detected", "delay_s", "recovered", "recover_s",
@@ -137,5 +137,5 @@ def test_the_report_has_tables_and_the_curve(runs: list[KidnapRun], tmp_path: Pa
 
 def test_a_report_that_cannot_be_written_is_refused(runs: list[KidnapRun], tmp_path: Path) -> None:
     (tmp_path / "report.md").mkdir()
-    with pytest.raises(InputError, match="a folder where a report can be written"):
+    with pytest.raises(InputError, match="a place where results can be written"):
         write_kidnap_report(runs, kidnap_document(runs), tmp_path)

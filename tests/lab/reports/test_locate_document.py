@@ -1,28 +1,27 @@
-"""Which tasks a benchmark has, and what its document says."""
+"""The figures of `firstfix bench CASES`, counted by hand."""
 
 import json
-from dataclasses import asdict, replace
-from functools import partial
+from dataclasses import asdict
 
-import numpy as np
 import pytest
 
-from firstfix.core.errors import InputError, MapError
 from firstfix.core.estimate import Verdict
-from firstfix.core.grid import OccupancyGrid
 from firstfix.core.pose_error import PoseError
-from firstfix.core.recording import Recording
 from firstfix.global_localization.config import Method
-from firstfix.lab.experiments.case import Case
-from firstfix.lab.experiments.case_runs import CaseRun, WrongMapRun
-from firstfix.lab.experiments.case_tasks import case_tasks, run_tasks, wrong_map_tasks
+from firstfix.lab.experiments.locate_bench import CaseRun, WrongMapRun
 from firstfix.lab.metrics.metrics import summarize
 from firstfix.lab.metrics.outcome import NO_POSE, Outcome
-from firstfix.lab.reports.document import bench_document
-from firstfix.lab.reports.tables import bench_table, markdown_table, wrong_map_table
+from firstfix.lab.reports.locate_document import (
+    bench_document,
+    bench_table,
+    buildings_table,
+    sensors_table,
+    wrong_map_table,
+)
+from firstfix.lab.reports.text import markdown_table
 
 KEYS = {
-    "name", "method", "n", "success", "success_02", "recall_10", "unique", "wrong_unique",
+    "name", "method", "sensor", "n", "success", "success_02", "recall_10", "unique", "wrong_unique",
     "median_m", "median_deg", "p95_m", "cpu_s", "cpu_s_p95", "wall_s", "prepare_s", "rss_mb",
 }  # fmt: skip
 
@@ -31,8 +30,12 @@ WRONG = Outcome(1, Verdict.UNIQUE, PoseError(5.0, 0.001), None, 0.05, 0.06, 0.96
 LOST = Outcome(2, Verdict.NO_MATCH, NO_POSE, None, 0.01, 0.02, 0.0)
 
 
-def run(name: str, method: Method, *outcomes: Outcome) -> CaseRun:
-    return CaseRun(name, name, "sim", method, outcomes, 100.0, 0.5, 200.0)
+def run(name: str, method: Method, *outcomes: Outcome, sensor: str = "recorded") -> CaseRun:
+    return CaseRun(name, name, "sim", sensor, method, outcomes, 100.0, 0.5, 200.0)
+
+
+def wrong(case: str, on: str, method: Method, n: int, unique: int, *p: float) -> WrongMapRun:
+    return WrongMapRun(case, case, "sim", "recorded", on, method, n, unique, p)
 
 
 RUNS = [
@@ -41,44 +44,11 @@ RUNS = [
     run("a", Method.PAPER, WRONG),
 ]
 WRONG_MAP = [
-    WrongMapRun("a", "b", Method.FAST, 3, 1, "real", (0.97, 0.4, 0.0)),
-    WrongMapRun("b", "a", Method.FAST, 1, 0, "sim", (0.3,)),
-    WrongMapRun("a", "b", Method.PAPER, 3, 3, "real", (1.0, 1.0, 1.0)),
+    wrong("a", "b", Method.FAST, 3, 1, 0.97, 0.4, 0.0),
+    wrong("b", "a", Method.FAST, 1, 0, 0.3),
+    wrong("a", "b", Method.PAPER, 3, 3, 1.0, 1.0, 1.0),
 ]
-METHODS = [Method.FAST, Method.PAPER]
-DOCUMENT = bench_document(RUNS, WRONG_MAP, METHODS)
-
-
-def test_every_case_meets_every_method(case: Case) -> None:
-    other = replace(case, name="other", site="there")
-    tasks = case_tasks([case, other], METHODS, 3)
-    assert [(t.case.name, t.method.value) for t in tasks] == [
-        ("hall", "fast"), ("other", "fast"), ("hall", "paper"), ("other", "paper"),
-    ]  # fmt: skip
-    assert {t.limit for t in tasks} == {3}
-
-
-def test_wrong_maps_are_those_of_the_next_other_building(case: Case) -> None:
-    cases = [replace(case, name=n, site=n[0]) for n in ("x1", "x2", "y1")]
-    pairs = [(t.case.name, t.on.name) for t in wrong_map_tasks(cases, [Method.FAST], 0)]
-    assert pairs == [("x1", "y1"), ("x2", "y1"), ("y1", "x1")]
-    assert wrong_map_tasks(cases[:2], [Method.FAST], 0) == []
-
-
-@pytest.mark.slow
-def test_a_case_that_cannot_be_loaded_ends_the_benchmark() -> None:
-    unloadable = Case(
-        "broken",
-        "here",
-        "sim",
-        partial(OccupancyGrid, np.zeros((0, 0)), 1.0),
-        partial(Recording, ()),
-    )
-    with pytest.raises(InputError, match="at least one scan"):
-        run_tasks(case_tasks([unloadable], [Method.FAST], 0), 1, print)
-    wrong_map = wrong_map_tasks([unloadable, replace(unloadable, site="there")], [Method.FAST], 0)
-    with pytest.raises((MapError, InputError)):
-        run_tasks(wrong_map, 2, print)
+DOCUMENT = bench_document(RUNS, WRONG_MAP)
 
 
 def test_the_document_has_the_agreed_keys_and_is_json() -> None:
@@ -111,9 +81,23 @@ def test_totals_are_of_one_method_each_and_the_first_comes_first() -> None:
 
 
 def test_no_wrong_map_is_nothing_counted() -> None:
-    document = bench_document(RUNS, [], METHODS)
+    document = bench_document(RUNS)
     assert document["wrong_map"] == {"n": 0, "unique": 0}
     assert document["wrong_map_cases"] == []
+
+
+def test_sensors_and_buildings_count_every_scan_alike() -> None:
+    narrow = run("b", Method.FAST, HIT, sensor="60° x 5 m")
+    document = bench_document([*RUNS[:2], narrow], WRONG_MAP[:2])
+    recorded, cut = document["sensors"]
+    assert (recorded["sensor"], recorded["n"], recorded["wrong_unique"]) == ("recorded", 4, 1)
+    assert recorded["wrong_of_unique"] == pytest.approx(1 / 3)
+    assert (recorded["wrong_map_n"], recorded["wrong_map_unique"]) == (4, 0.25)
+    assert (cut["sensor"], cut["n"], cut["wrong_map_unique"]) == ("60° x 5 m", 1, None)
+    rows = [(row["site"], row["sensor"], row["n"]) for row in document["buildings"]]
+    assert rows == [("a", "recorded", 3), ("b", "recorded", 1), ("b", "60° x 5 m", 1)]
+    assert len(sensors_table(document).splitlines()) == 2 + 2
+    assert len(buildings_table(document).splitlines()) == 2 + 3
 
 
 def test_tables_show_every_row_aligned() -> None:
