@@ -247,7 +247,7 @@ def test_results_that_cannot_be_written_are_refused_first(
     (tmp_path / "file").write_text("in the way")
     for option in ("--out", "--save-pose"):
         assert_one_line(cli("track", *files, option, "file/result"), "file/result")
-    assert_one_line(cli("track", *files, "--plot", "file/track.png"), "file/track.png")
+    assert_one_line(cli("track", *files, "--plot", "file/track.png"), "track.png", "file")
     assert_one_line(cli("track", *files, "--plot", "track.jpeg"), "track.jpeg")
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     assert_one_line(cli("track", *files, "--plot", "track.png"), "firstfix[plot]")
