@@ -89,7 +89,7 @@ def judged(
     # As many effective beams as beams: no tempering, for AMCL's way of combining them.
     count = effective_beams or config.max_beams
     errors, headings, inside = [], [], []
-    with mock.patch.object(sensor_module, "INDEPENDENT_BEAMS", count):
+    with mock.patch.object(sensor_module, "EFFECTIVE_BEAMS", count):
         rng = np.random.default_rng(seed)
         for tracked in follow_drive(drive, tracker, config, TRUE_START, rng):
             truth = tracked.sight.truth

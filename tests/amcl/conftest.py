@@ -34,18 +34,18 @@ def room() -> OccupancyGrid:
 
 
 @pytest.fixture(scope="session")
-def looking() -> Callable[..., LaserScan]:
+def observe() -> Callable[..., LaserScan]:
     """Give a function that looks around somewhere."""
 
-    def looking(grid: OccupancyGrid, pose: SE2, seed: int = 0) -> LaserScan:
+    def observe(grid: OccupancyGrid, pose: SE2, seed: int = 0) -> LaserScan:
         return LIDAR.scan(grid, pose, np.random.default_rng(seed))
 
-    return looking
+    return observe
 
 
 @pytest.fixture(scope="session")
 def fixed() -> Callable[..., AmclConfig]:
-    """Give a function that makes settings of so many particles, no more and no less."""
+    """Give a function that makes settings with a fixed number of particles."""
 
     def fixed(n: int, **settings: object) -> AmclConfig:
         return AmclConfig(min_particles=n, max_particles=n, **settings)
@@ -55,7 +55,7 @@ def fixed() -> Callable[..., AmclConfig]:
 
 @pytest.fixture(scope="session")
 def never() -> Injection:
-    """Inject nothing, and refuse to be asked."""
+    """Fail if particles are injected."""
 
     def never(scan: LaserScan, n: int, rng: np.random.Generator) -> NDArray[np.float64]:
         raise AssertionError("nothing is to be injected")

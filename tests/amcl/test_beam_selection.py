@@ -28,7 +28,7 @@ def test_each_kind_of_reading():
     assert beams.ranges.tolist() == [2.0, 10.0, 10.0, 10.0, 9.5]
     assert len(beams) == 5
     assert len(beams.hits) == 2
-    assert beams.chosen == 10  # what could not be read was looked at, too
+    assert beams.chosen == 10  # invalid readings are counted, too
 
 
 @given(st.integers(1, 500), st.integers(2, 300))
@@ -53,7 +53,7 @@ def test_end_points_are_those_of_the_scan(mounting):
     np.testing.assert_allclose(beams.hits, scan.points())
     from_sensor = beams.ends - [place.x, place.y]
     np.testing.assert_allclose(np.hypot(*from_sensor.T), beams.ranges)
-    # Bearings are given in the base frame: the end points say the same.
+    # Bearings are given in the base frame: the end points agree.
     expected = beams.ranges[:, None] * np.column_stack(
         [np.cos(beams.bearings), np.sin(beams.bearings)]
     )

@@ -165,7 +165,7 @@ def test_the_order_of_particles_changes_nothing():
 
 
 def test_covariance_is_about_the_reported_pose():
-    """A sharper belief moves the mean; what may be wrong is told from there."""
+    """A sharper belief moves the mean, and the covariance is about that mean."""
     rng = np.random.default_rng(5)
     poses = cloud(rng, (2.2, -1.2, math.pi), 500)
     belief = equal_weights(poses).reweighed(rng.random(500))
@@ -178,7 +178,7 @@ def test_covariance_is_about_the_reported_pose():
     expected = about(poses, belief.weight, cluster.pose)
     np.testing.assert_allclose(cluster.covariance, expected, atol=1e-15)
     assert cluster.covariance[0, 0] > np.cov(poses.T, aweights=belief.weight)[0, 0]
-    assert cluster.mass == pytest.approx(1.0)  # that is what the belief says, not the emphasis
+    assert cluster.mass == pytest.approx(1.0)  # the mass of the belief, not of the emphasis
 
 
 def test_a_place_without_emphasis_is_still_a_place():

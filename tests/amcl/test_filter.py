@@ -26,13 +26,13 @@ MIDDLE = SE2(3.8, 3.1, 0.0)  # 1.7 m around it are free
 AHEAD = SE2(0.25, 0.0, 0.1)
 
 
-def says(reading: float) -> LaserScan:
+def scan_of_range(reading: float) -> LaserScan:
     return LaserScan(np.full(60, reading, np.float32), -3.0, 0.1, 0.1, 8.0)
 
 
 @pytest.mark.parametrize("model", SensorModel)
 @pytest.mark.parametrize("motion", MotionModel)
-def test_after_every_step_there_is_a_belief(room, model, motion, never, looking, assert_is_belief):
+def test_after_every_step_there_is_a_belief(room, model, motion, never, observe, assert_is_belief):
     config = AmclConfig(
         min_particles=50,
         max_particles=600,
@@ -45,7 +45,7 @@ def test_after_every_step_there_is_a_belief(room, model, motion, never, looking,
     state = start(over_free_space(room, 600, rng))
     pose = MIDDLE
     for k in range(6):
-        state = step(state, AHEAD, looking(room, pose, k), sensor, rng, config, never)
+        state = step(state, AHEAD, observe(room, pose, k), sensor, rng, config, never)
         assert_is_belief(state, config)
         assert state.updates == k + 1
         if k % 2 == 1:
@@ -64,7 +64,7 @@ def test_scans_that_say_nothing_or_nonsense_leave_a_belief(
     sensor, rng = build_sensor(room, config), np.random.default_rng(0)
     state = start(over_free_space(room, 100, rng))
     for _ in range(4):
-        state = step(state, AHEAD, says(reading), sensor, rng, config, inject_free(room))
+        state = step(state, AHEAD, scan_of_range(reading), sensor, rng, config, inject_free(room))
         assert_is_belief(state, config)
 
 
@@ -81,7 +81,7 @@ def test_a_scan_that_says_nothing_changes_neither_weights_nor_history(room, read
     )
     sensor = build_sensor(room, config)
     rng = np.random.default_rng(3)
-    after = step(before, AHEAD, says(reading), sensor, rng, config, never)
+    after = step(before, AHEAD, scan_of_range(reading), sensor, rng, config, never)
     np.testing.assert_allclose(after.particles.weight, before.particles.weight)
     assert after.history == before.history
 
@@ -96,32 +96,34 @@ def test_a_map_smaller_than_the_beams_reach_is_a_map(model, shape, never, fixed,
     rng = np.random.default_rng(0)
     state = start(around_pose(SE2(2.0, 1.0, 0.0), np.eye(3), 40, rng))
     for _ in range(3):
-        state = step(state, AHEAD, says(3.0), build_sensor(grid, config), rng, config, never)
+        state = step(
+            state, AHEAD, scan_of_range(3.0), build_sensor(grid, config), rng, config, never
+        )
         assert_is_belief(state, config)
 
 
 @pytest.mark.parametrize("model", SensorModel)
 @pytest.mark.parametrize("x", [-30.0, 1e5, 1e12])
 def test_particles_outside_the_map_are_a_belief(
-    room, model, x, never, fixed, looking, assert_is_belief
+    room, model, x, never, fixed, observe, assert_is_belief
 ):
     config = fixed(60, laser_model_type=model)
     rng = np.random.default_rng(0)
     state = start(around_pose(SE2(x, -x, 1.0), np.eye(3), 60, rng))
     for _ in range(3):
-        scan = looking(room, MIDDLE)
+        scan = observe(room, MIDDLE)
         state = step(state, AHEAD, scan, build_sensor(room, config), rng, config, never)
         assert_is_belief(state, config)
     assert state.estimate.pose.x == pytest.approx(x, abs=10.0)
 
 
 @pytest.mark.parametrize("model", SensorModel)
-def test_one_particle_is_a_belief(room, model, never, fixed, looking, assert_is_belief):
+def test_one_particle_is_a_belief(room, model, never, fixed, observe, assert_is_belief):
     config = fixed(1, laser_model_type=model)
     rng = np.random.default_rng(0)
     state = start(around_pose(MIDDLE, NEAR, 1, rng))
     for increment in (AHEAD, SE2.identity(), AHEAD):
-        scan = looking(room, MIDDLE)
+        scan = observe(room, MIDDLE)
         state = step(state, increment, scan, build_sensor(room, config), rng, config, never)
         assert_is_belief(state, config)
         assert state.elsewhere == 0.0
@@ -140,13 +142,13 @@ def test_the_estimate_is_the_heaviest_place(room):
     assert state.elsewhere == pytest.approx(1.0 - state.estimate.mass)
 
 
-def test_masses_are_of_the_belief_after_the_scan(room, never, fixed, looking):
-    """Not of the sharper one in which the peak is looked for."""
+def test_masses_are_of_the_belief_after_the_scan(room, never, fixed, observe):
+    """Not of the sharper one that estimates the mode."""
     config = fixed(500, resample_interval=5)
     rng = np.random.default_rng(0)
     state = start(over_free_space(room, 500, rng))
     state = step(
-        state, AHEAD, looking(room, MIDDLE), build_sensor(room, config), rng, config, never
+        state, AHEAD, observe(room, MIDDLE), build_sensor(room, config), rng, config, never
     )
     again = find_clusters(state.particles, state.particles.weight)
     assert [c.mass for c in state.clusters] == [c.mass for c in again]
@@ -154,7 +156,7 @@ def test_masses_are_of_the_belief_after_the_scan(room, never, fixed, looking):
 
 
 @pytest.mark.parametrize("model", SensorModel)
-def test_one_seed_is_one_result_with_any_number_of_threads(room, model, looking, inject_free):
+def test_one_seed_is_one_result_with_any_number_of_threads(room, model, observe, inject_free):
     """All share one sensor model, as the robots of one building do."""
     config = AmclConfig(
         min_particles=100,
@@ -164,7 +166,7 @@ def test_one_seed_is_one_result_with_any_number_of_threads(room, model, looking,
         recovery_alpha_fast=0.5,
     )
     sensor = build_sensor(room, config)
-    scans = [looking(room, MIDDLE, k) for k in range(5)]
+    scans = [observe(room, MIDDLE, k) for k in range(5)]
 
     def follow(seed: int) -> list[FilterState]:
         rng = np.random.default_rng(seed)
@@ -189,13 +191,13 @@ def test_one_seed_is_one_result_with_any_number_of_threads(room, model, looking,
 
 @pytest.mark.parametrize("move", [SE2(3.0, -40.0, 0.0), SE2(-7.0, 5.0, 2.3)], ids=str)
 @pytest.mark.parametrize("model", SensorModel)
-def test_moving_map_and_belief_together_moves_the_answer(room, move, model, never, fixed, looking):
+def test_moving_map_and_belief_together_moves_the_answer(room, move, model, never, fixed, observe):
     """Where a beam ends near the side of a cell, float32 may round to the other: so not exactly."""
     config = fixed(500, laser_model_type=model)
     there = OccupancyGrid(room.cells, room.resolution, move @ room.T_map_grid)
     belief = around_pose(MIDDLE, NEAR, 500, np.random.default_rng(0)).poses()
     moved = np.column_stack([move.apply(belief[:, :2]), belief[:, 2] + move.yaw])
-    scan = looking(room, MIDDLE @ AHEAD)
+    scan = observe(room, MIDDLE @ AHEAD)
     here, away = (
         step(
             start(equal_weights(poses)),
@@ -215,20 +217,20 @@ def test_moving_map_and_belief_together_moves_the_answer(room, move, model, neve
     np.testing.assert_allclose(away.estimate.covariance, turned, atol=1e-5)
 
 
-def test_resampling_comes_when_it_is_due(room, never, fixed, looking):
+def test_resampling_comes_when_it_is_due(room, never, fixed, observe):
     config = fixed(200, resample_interval=3)
     sensor, rng = build_sensor(room, config), np.random.default_rng(0)
     state = start(around_pose(MIDDLE, NEAR, 200, rng))
     equal = []
     for _ in range(6):
-        state = step(state, SE2.identity(), looking(room, MIDDLE), sensor, rng, config, never)
+        state = step(state, SE2.identity(), observe(room, MIDDLE), sensor, rng, config, never)
         equal.append(bool(np.ptp(state.particles.weight) == 0.0))
     assert equal == [False, False, True, False, False, True]
 
 
 @pytest.mark.parametrize("spread", [1e-4, 0.5])
 def test_selective_resampling_waits_until_few_particles_carry_the_belief(
-    room, spread, never, fixed, looking
+    room, spread, never, fixed, observe
 ):
     config = fixed(200, selective_resampling=True)
     sensor, rng = build_sensor(room, config), np.random.default_rng(0)
@@ -236,18 +238,18 @@ def test_selective_resampling_waits_until_few_particles_carry_the_belief(
     before = state.particles.poses()
     silent = replace(config, alpha1=0.0, alpha2=0.0, alpha3=0.0, alpha4=0.0)
     turn = SE2(0.0, 0.0, math.radians(1.0))
-    scan = looking(room, MIDDLE @ turn)
+    scan = observe(room, MIDDLE @ turn)
     state = step(state, turn, scan, sensor, rng, silent, never)
     kept = len(np.unique(state.particles.x)) == len(before)
     assert kept == (spread < 0.01)
     assert (np.ptp(state.particles.weight) > 0.0) == kept
 
 
-def test_what_never_moves_does_not_become_sure_by_odometry_that_drifts(room, never, fixed, looking):
+def test_what_never_moves_does_not_become_sure_by_odometry_that_drifts(room, never, fixed, observe):
     config = fixed(200, robot_model_type=MotionModel.STATIONARY)
     sensor, rng = build_sensor(room, config), np.random.default_rng(0)
     state = start(around_pose(MIDDLE, NEAR, 200, rng))
     for k in range(60):
-        state = step(state, AHEAD, looking(room, MIDDLE, k), sensor, rng, config, never)
+        state = step(state, AHEAD, observe(room, MIDDLE, k), sensor, rng, config, never)
     assert len(np.unique(state.particles.x)) > 20
     assert state.estimate.covariance[0, 0] > 1e-5

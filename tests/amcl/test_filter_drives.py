@@ -1,4 +1,4 @@
-"""Many steps of the filter: it follows the robot, and knows how well."""
+"""Many steps of the filter: it follows the robot, and its covariance matches its errors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ THREE_SIGMA = 14.16
 
 @pytest.fixture
 def drive(never):
-    """Give a function that drives about the middle; odometry is as wrong as the filter is told."""
+    """Give a function that drives about the middle with the odometry noise of the settings."""
 
     def drive(
         grid: OccupancyGrid, config: AmclConfig, seed: int, steps: int = 20
@@ -73,7 +73,7 @@ def test_the_truth_is_within_three_sigma_of_the_estimate(room, alpha, fixed, dri
     traces = [drive(room, config, seed) for seed in range(50)]
     errors = np.array([squared_error(*now) for trace in traces for now in trace])
     assert (errors < THREE_SIGMA).mean() >= 0.95
-    # Nor is that so because it claims to know nothing.
+    # The covariance is not merely large.
     sigmas = [np.sqrt(np.diag(s.estimate.covariance)) for trace in traces for _, s in trace[5:]]
     assert np.median(sigmas, axis=0)[:2].max() < 0.15
     assert np.median(sigmas, axis=0)[2] < math.radians(5.0)

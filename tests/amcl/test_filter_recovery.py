@@ -22,43 +22,43 @@ ELSEWHERE = SE2(6.8, 1.4, 2.0)
 
 
 @pytest.fixture
-def well_known(looking, inject_free):
+def converged(observe, inject_free):
     """Give the belief of a robot that has stood in the middle for a while."""
 
-    def well_known(grid: OccupancyGrid, config: AmclConfig, seed: int = 0) -> FilterState:
+    def converged(grid: OccupancyGrid, config: AmclConfig, seed: int = 0) -> FilterState:
         sensor, rng = build_sensor(grid, config), np.random.default_rng(seed)
         quiet = replace(config, recovery_alpha_slow=0.01, recovery_alpha_fast=0.01)
         state = start(around_pose(MIDDLE, NEAR, config.max_particles, rng))
-        scan = looking(grid, MIDDLE)
+        scan = observe(grid, MIDDLE)
         for _ in range(4):
             state = step(state, SE2.identity(), scan, sensor, rng, quiet, inject_free(grid))
         return replace(state, history=WeightHistory(0.4, 0.4))
 
-    return well_known
+    return converged
 
 
-def test_without_recovery_nothing_is_ever_injected(room, never, fixed, looking, well_known):
+def test_without_recovery_nothing_is_ever_injected(room, never, fixed, observe, converged):
     config = fixed(200)
-    state, sensor = well_known(room, config), build_sensor(room, config)
+    state, sensor = converged(room, config), build_sensor(room, config)
     rng = np.random.default_rng(1)
     for _ in range(5):
-        scan = looking(room, ELSEWHERE)
+        scan = observe(room, ELSEWHERE)
         state = step(state, SE2.identity(), scan, sensor, rng, config, never)
     assert state.particles.x.max() < 5.0
 
 
 def test_a_scan_that_stops_fitting_brings_new_particles(
-    room, fixed, looking, assert_is_belief, well_known
+    room, fixed, observe, assert_is_belief, converged
 ):
     config = fixed(200, **ON)
-    before, asked = well_known(room, config), []
+    before, asked = converged(room, config), []
     marked = np.array([6.0, 2.0, 1.0])
 
     def inject(scan, n, rng):
         asked.append((scan, n))
         return np.tile(marked, (n, 1))
 
-    scan = looking(room, ELSEWHERE)
+    scan = observe(room, ELSEWHERE)
     rng = np.random.default_rng(1)
     sensor = build_sensor(room, config)
     after = step(before, SE2.identity(), scan, sensor, rng, config, inject)
@@ -70,14 +70,14 @@ def test_a_scan_that_stops_fitting_brings_new_particles(
     assert len(after.particles) == 200
     assert after.history == WeightHistory()  # or it would go on until all is chance
     assert_is_belief(after, config)
-    # The estimate is that of before: chance has no say in where the robot is.
+    # The estimate precedes injection: injected particles do not change it.
     assert after.estimate.pose.distance_to(MIDDLE) < 0.5
 
 
-def test_how_many_come_is_what_the_averages_say(room, never, fixed, looking, well_known):
+def test_the_number_injected_follows_from_the_averages(room, never, fixed, observe, converged):
     config = fixed(1000, **ON)
-    before = replace(well_known(room, config), history=WeightHistory(0.5, 0.5))
-    scan, sensor = looking(room, ELSEWHERE), build_sensor(room, config)
+    before = replace(converged(room, config), history=WeightHistory(0.5, 0.5))
+    scan, sensor = observe(room, ELSEWHERE), build_sensor(room, config)
     seen = step(
         before,
         SE2.identity(),
@@ -99,15 +99,15 @@ def test_how_many_come_is_what_the_averages_say(room, never, fixed, looking, wel
 
 @pytest.mark.parametrize("offered", [0, 3, 5000])
 def test_injection_may_give_fewer_or_more_than_asked(
-    room, offered, looking, assert_is_belief, well_known
+    room, offered, observe, assert_is_belief, converged
 ):
     config = AmclConfig(min_particles=50, max_particles=300, **ON)
-    before = well_known(room, config)
+    before = converged(room, config)
 
     def inject(scan, n, rng):
         return np.tile([6.0, 2.0, 1.0], (offered, 1))
 
-    scan, rng = looking(room, ELSEWHERE), np.random.default_rng(1)
+    scan, rng = observe(room, ELSEWHERE), np.random.default_rng(1)
     sensor = build_sensor(room, config)
     after = step(before, SE2.identity(), scan, sensor, rng, config, inject)
     assert_is_belief(after, config)
@@ -116,34 +116,32 @@ def test_injection_may_give_fewer_or_more_than_asked(
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_kidnapped_robot_is_found_where_the_injection_says(
-    room, seed, fixed, looking, well_known
-):
+def test_a_kidnapped_robot_is_found_where_the_injection_says(room, seed, fixed, observe, converged):
     config = fixed(300, **ON)
-    state, sensor = well_known(room, config, seed), build_sensor(room, config)
+    state, sensor = converged(room, config, seed), build_sensor(room, config)
     rng = np.random.default_rng(seed)
 
     def inject(scan, n, rng):
         return np.tile(ELSEWHERE.as_array(), (n, 1))
 
     for k in range(3):
-        scan = looking(room, ELSEWHERE, k)
+        scan = observe(room, ELSEWHERE, k)
         state = step(state, SE2.identity(), scan, sensor, rng, config, inject)
     assert state.estimate.pose.distance_to(ELSEWHERE) < 0.1
     assert state.estimate.mass > 0.9
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_kidnapped_robot_is_found_by_chance(room, seed, fixed, looking, inject_free, well_known):
+def test_a_kidnapped_robot_is_found_by_chance(room, seed, fixed, observe, inject_free, converged):
     # So many, drawn so often, that no seed of 40 has missed.
     config = fixed(4000, recovery_alpha_slow=0.01, recovery_alpha_fast=0.9)
-    state, sensor = well_known(room, config, seed), build_sensor(room, config)
+    state, sensor = converged(room, config, seed), build_sensor(room, config)
     rng = np.random.default_rng(seed)
     truth, increment = ELSEWHERE, SE2(0.0, 0.0, 0.3)
     found = []
     for k in range(40):
         truth = truth @ increment
-        scan = looking(room, truth, k)
+        scan = observe(room, truth, k)
         state = step(state, increment, scan, sensor, rng, config, inject_free(room))
         found.append(state.estimate.pose.distance_to(truth) < 0.2)
     assert not found[0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -76,7 +77,7 @@ def settled(particles: Particles, beams: SelectedBeams, grid: OccupancyGrid) -> 
 
 
 def distance_m(end: NDArray[np.float64], grid: OccupancyGrid, config: AmclConfig) -> float:
-    """Distance of an end point's cell to the nearest wall, m; NaN where nobody knows."""
+    """Distance of an end point's cell to the nearest wall, m; NaN in unknown space."""
     column, row = (math.floor(v) for v in end)
     inside = 0 <= column < grid.width and 0 <= row < grid.height
     if config.model_unknown_space and not (inside and not grid.unknown[row, column]):
@@ -128,7 +129,7 @@ def assert_equal_to_brute_force(
     expected, expected_used = brute_force(particles, beams, grid, config)
     assert used == expected_used
     np.testing.assert_allclose(logs, expected, atol=used * UNIT / 2 + 1e-9)
-    assert np.ptp(expected) > 1.0  # these poses are not alike
+    assert np.ptp(expected) > 1.0  # these poses differ
 
 
 @pytest.mark.parametrize("unknown", [False, True])
@@ -217,7 +218,7 @@ def skipping(grid: OccupancyGrid, **settings: object) -> tuple[int, int]:
     """Of a scan that fits but for one third of its beams: beams that hit, and those used."""
     pose = np.array([2.1, 2.1, 0.0])
     ranges = np.full(30, 1.6)  # up to the wall ...
-    ranges[10:20] = 0.5  # ... but for somebody who stands before it
+    ranges[10:20] = 0.5  # ... except where a person stands in front of it
     scan = LaserScan(ranges, -0.2, 0.4 / 29, 0.05, 8.0)
     config = AmclConfig(
         laser_model_type=PROB, beam_skip_distance=0.4, **({"do_beamskip": True} | settings)
@@ -239,7 +240,7 @@ def test_beams_that_few_explain_are_left_out():
     assert skipping(grid, beam_skip_error_threshold=0.4) == (30, 20)
 
 
-def test_what_explains_a_beam_is_told_once_not_for_every_scan(monkeypatch):
+def test_the_cells_that_explain_a_beam_are_computed_once(monkeypatch):
     """It is as large as the map."""
     count, seen = likelihood_field._count_values, []
 
@@ -355,26 +356,13 @@ def test_as_many_beams_as_a_scan_may_have_are_summed_without_overflow():
     np.testing.assert_allclose(logs, 20_000 * math.log(1e-9), rtol=1e-5)
 
 
-class Contested(LikelihoodField):
-    """Between any two looks at the kept table, another thread replaces it by its own."""
-
-    @property
-    def _values(self):
-        kept = self.kept
-        self.kept = (99.0, np.zeros_like(kept[1]))
-        return kept
-
-    @_values.setter
-    def _values(self, kept):
-        self.kept = (99.0, np.zeros_like(kept[1]))
-
-
-def test_sensors_of_other_reach_may_ask_at_the_same_time():
-    field, particles = Contested(drawn(), AmclConfig()), somewhere(drawn(), 20)
-    beams = select_beams(scan_of(40), AmclConfig())
-    expected, _ = LikelihoodField(drawn(), AmclConfig()).log_likelihood(particles, beams)
-    logs, _ = field.log_likelihood(particles, beams)
-    np.testing.assert_array_equal(logs, expected)
-    field.kept = (beams.range_max, field._table(beams.range_max))
-    logs, _ = field.log_likelihood(particles, beams)
-    np.testing.assert_array_equal(logs, expected)
+def test_threads_with_sensors_of_different_range_share_a_field():
+    grid, config = drawn(), AmclConfig()
+    scans = [dataclasses.replace(scan_of(40), range_max=limit) for limit in (5.0, 6.0, 7.0)]
+    beams = [select_beams(scan, config) for scan in scans]
+    particles, shared = somewhere(grid, 20), LikelihoodField(grid, config)
+    alone = [LikelihoodField(grid, config).log_likelihood(particles, b)[0] for b in beams]
+    with ThreadPoolExecutor(3) as pool:
+        together = pool.map(lambda b: shared.log_likelihood(particles, b)[0], beams * 20)
+        for i, logs in enumerate(together):
+            np.testing.assert_array_equal(logs, alone[i % 3])

@@ -1,4 +1,4 @@
-"""What odometry does to the particles: the way it says, and errors as large as the alphas say."""
+"""Motion of the particles: the increment of the odometry, and noise as large as the alphas give."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_without_noise_every_particle_moves_exactly(model, increment):
         SE2(0.0, 0.4, 0.0),
         SE2(40.0, -3.0, 3.0),
         SE2(-0.05, 0.0, math.pi - 0.01),  # turning in place, but for a few centimetres backwards
-        SE2(-0.009, 0.0, 0.0),  # too little to say in which direction
+        SE2(-0.009, 0.0, 0.0),  # too short to have a direction
         SE2(0.002, -0.003, 0.2),
     ],
     ids=str,

@@ -101,7 +101,7 @@ def test_moving_map_and_particles_together_changes_nothing(room, move):
     beams = select_beams(scan_of(40, 2, T_base_laser=PLACE), BEAM)
     logs, _ = RayModel(room, BEAM).log_likelihood(equal_weights(poses), beams)
     moved_logs, _ = RayModel(there, BEAM).log_likelihood(equal_weights(moved), beams)
-    # A ray past the very corner of a cell may turn out either way; of 8000, hardly one does.
+    # A ray past the very corner of a cell may turn out either way; of 8000, at most one does.
     same = np.isclose(moved_logs, logs, rtol=1e-6)
     assert same.mean() >= 0.99
 

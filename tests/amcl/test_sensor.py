@@ -13,14 +13,14 @@ from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.amcl.likelihood_field import LikelihoodField
 from firstfix.amcl.particles import Particles, equal_weights
 from firstfix.amcl.ray_model import RayModel
-from firstfix.amcl.sensor import INDEPENDENT_BEAMS, build_sensor, weigh
+from firstfix.amcl.sensor import EFFECTIVE_BEAMS, build_sensor, weigh
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.lab.simulation.lidar import Lidar
 
 
 class Told:
-    """A sensor that says what it was told."""
+    """A sensor with given log-likelihoods."""
 
     def __init__(self, logs: list[float], used: int) -> None:
         self.logs, self.used = np.array(logs), used
@@ -56,8 +56,8 @@ def test_the_model_is_that_of_the_settings(room, model, kind):
     assert sensor.config is config
 
 
-@pytest.mark.parametrize("n", [1, 5, INDEPENDENT_BEAMS])
-def test_few_beams_are_witnesses_of_their_own(n):
+@pytest.mark.parametrize("n", [1, 5, EFFECTIVE_BEAMS])
+def test_few_beams_are_independent(n):
     logs = [-3.0, -1.0, -2.5]
     likelihood, _ = weigh(three(), beams_of(n), Told(logs, n))
     np.testing.assert_allclose(likelihood, np.exp(np.array(logs) + 1.0))
@@ -65,7 +65,7 @@ def test_few_beams_are_witnesses_of_their_own(n):
 
 @pytest.mark.parametrize("times", [2, 3, 10])
 def test_the_same_beams_many_times_over_are_not_many_times_as_sure(times):
-    n = 2 * INDEPENDENT_BEAMS
+    n = 2 * EFFECTIVE_BEAMS
     logs = np.array([-3.0, -1.0, -2.5]) * n
     once, fit = weigh(three(), beams_of(n), Told(list(logs), n))
     often, fits = weigh(three(), beams_of(times * n), Told(list(times * logs), times * n))
@@ -77,7 +77,7 @@ def test_the_best_particle_has_likelihood_one_and_none_overflows():
     for best in (-1e6, -5000.0, 0.0, 300.0):
         likelihood, _ = weigh(three(), beams_of(60), Told([best - 1e5, best, best - 4.0], 60))
         np.testing.assert_allclose(
-            likelihood, [0.0, 1.0, math.exp(-4.0 * INDEPENDENT_BEAMS / 60)], atol=1e-300
+            likelihood, [0.0, 1.0, math.exp(-4.0 * EFFECTIVE_BEAMS / 60)], atol=1e-300
         )
 
 

@@ -33,13 +33,13 @@ def tracker_of(grid: OccupancyGrid, config: AmclConfig = CONFIG) -> Tracker:
     return Tracker(build_sensor(grid, config), config, never)
 
 
-def looking(grid: OccupancyGrid, pose: SE2, seed: int = 0) -> LaserScan:
+def observe(grid: OccupancyGrid, pose: SE2, seed: int = 0) -> LaserScan:
     return LIDAR.scan(grid, pose, np.random.default_rng(seed))
 
 
 def begun(grid: OccupancyGrid, rng: np.random.Generator, config: AmclConfig = CONFIG) -> Track:
     belief = around_pose(POSE, NEAR, config.max_particles, rng)
-    return tracker_of(grid, config).begin(belief, ODOM, looking(grid, POSE), rng)
+    return tracker_of(grid, config).begin(belief, ODOM, observe(grid, POSE), rng)
 
 
 def test_a_track_begins_with_one_update(room):
@@ -68,7 +68,7 @@ def test_a_track_begins_with_one_update(room):
 def test_a_scan_is_taken_in_when_the_robot_has_moved_enough(room, moved, updates):
     rng = np.random.default_rng(0)
     track = begun(room, rng)
-    after = tracker_of(room).follow(track, ODOM @ moved, looking(room, POSE @ moved), rng)
+    after = tracker_of(room).follow(track, ODOM @ moved, observe(room, POSE @ moved), rng)
     assert after.state.updates == 1 + updates
     assert (after is track) == (updates == 0)
     if updates:
@@ -81,7 +81,7 @@ def test_small_motions_add_up(room):
     track, updates = begun(room, rng), []
     for k in range(1, 9):
         T_odom_base = ODOM @ SE2(0.1 * k, 0.0, 0.0)
-        scan = looking(room, POSE @ SE2(0.1 * k, 0.0, 0.0))
+        scan = observe(room, POSE @ SE2(0.1 * k, 0.0, 0.0))
         track = tracker_of(room).follow(track, T_odom_base, scan, rng)
         updates.append(track.state.updates - 1)
     assert updates == [0, 0, 1, 1, 1, 2, 2, 2]
@@ -92,7 +92,7 @@ def test_where_updates_are_asked_for_at_every_scan_there_is_one(room):
     config = AmclConfig(update_min_d=0.0, min_particles=50, max_particles=50)
     rng = np.random.default_rng(0)
     track = begun(room, rng, config)
-    after = tracker_of(room, config).follow(track, ODOM, looking(room, POSE), rng)
+    after = tracker_of(room, config).follow(track, ODOM, observe(room, POSE), rng)
     assert after.state.updates == 2
 
 
@@ -100,7 +100,7 @@ def test_where_updates_are_asked_for_at_every_scan_there_is_one(room):
 def test_drift_and_odometry_are_the_pose(room, moved):
     rng = np.random.default_rng(0)
     track = begun(room, rng)
-    scan = looking(room, POSE @ moved)
+    scan = observe(room, POSE @ moved)
     for now in (track, tracker_of(room).follow(track, ODOM @ moved, scan, rng)):
         pose = now.T_map_odom @ now.T_odom_base
         assert pose.distance_to(now.state.estimate.pose) < 1e-9
@@ -115,7 +115,7 @@ def test_an_update_is_a_step_by_what_odometry_moved(room):
     config, sensor = CONFIG, build_sensor(room, CONFIG)
     track = begun(room, np.random.default_rng(0))
     moved = SE2(0.4, -0.1, 0.3)
-    scan = looking(room, POSE @ moved)
+    scan = observe(room, POSE @ moved)
     after = Tracker(sensor, config, never).update(
         track, ODOM @ moved, scan, np.random.default_rng(1)
     )
@@ -132,23 +132,23 @@ def test_the_frame_of_odometry_means_nothing(room):
         rng = np.random.default_rng(0)
         belief = around_pose(POSE, NEAR, 300, rng)
         tracker = tracker_of(room)
-        track = tracker.begin(belief, T_odom_base, looking(room, POSE), rng)
-        track = tracker.follow(track, T_odom_base @ moved, looking(room, POSE @ moved), rng)
+        track = tracker.begin(belief, T_odom_base, observe(room, POSE), rng)
+        track = tracker.follow(track, T_odom_base @ moved, observe(room, POSE @ moved), rng)
         poses.append(track.state.estimate.pose)
     assert poses[0].distance_to(poses[1]) < 1e-3
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_standing_still_does_not_make_sure(room, seed):
-    """200 looks at the same walls tell little more than one."""
+    """200 scans of the same walls contain little more than one."""
     rng = np.random.default_rng(seed)
     truth = SE2.from_array(rng.multivariate_normal(POSE.as_array(), NEAR))
     tracker = tracker_of(room)
     belief = around_pose(POSE, NEAR, 300, rng)
-    track = tracker.begin(belief, ODOM, looking(room, truth, seed), rng)
+    track = tracker.begin(belief, ODOM, observe(room, truth, seed), rng)
     errors = []
     for k in range(200):
-        track = tracker.update(track, ODOM, looking(room, truth, 1000 * seed + k), rng)
+        track = tracker.update(track, ODOM, observe(room, truth, 1000 * seed + k), rng)
         estimate = track.state.estimate
         off = estimate.pose.as_array() - truth.as_array()
         off[2] = wrap(off[2])

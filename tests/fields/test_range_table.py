@@ -52,7 +52,7 @@ def test_every_entry_is_the_cast_range(seed, shape, resolution):
         pose = SE2(x[i] * resolution, y[i] * resolution, 0.0)
         ranges = expected_ranges(grid, pose, directions, REACH_M)
         counts = np.minimum(ranges / UNIT_M, FARTHEST)
-        # Half a count; a diagonal meets corners of cells exactly, and rounding says on which side.
+        # Half a count; a diagonal meets corners of cells exactly, and rounding decides the side.
         off = np.abs(table[i, :DIRECTIONS] - counts) > 0.5 + 1e-6
         off[DIRECTIONS // 8 :: DIRECTIONS // 4] = False
         assert not off.any()

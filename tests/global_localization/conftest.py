@@ -1,4 +1,4 @@
-"""Drawn worlds that several tests look at, and how they judge what was found there."""
+"""Drawn worlds that several tests use, and checks of answers."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def office_locator(maps_cache: Path) -> ScanMatcher:
 
 @pytest.fixture(scope="session")
 def found() -> Callable[[LocateResult, SE2, float, float], bool]:
-    """Give a function that tells whether the best hypothesis is near the truth: m, degrees."""
+    """Give a function that returns whether the best hypothesis is near the truth: m, degrees."""
 
     def found(result: LocateResult, truth: SE2, most_m: float, most_deg: float) -> bool:
         best = result.best
@@ -75,10 +75,10 @@ def found() -> Callable[[LocateResult, SE2, float, float], bool]:
 
 
 @pytest.fixture(scope="session")
-def told() -> Callable[[LocateResult], tuple[object, ...]]:
+def content_of() -> Callable[[LocateResult], tuple[object, ...]]:
     """Give a function that returns all of an answer but the time it took, to the last bit."""
 
-    def told(result: LocateResult) -> tuple[object, ...]:
+    def content_of(result: LocateResult) -> tuple[object, ...]:
         return (
             result.verdict,
             result.reason,
@@ -89,12 +89,12 @@ def told() -> Callable[[LocateResult], tuple[object, ...]]:
             ],
         )
 
-    return told
+    return content_of
 
 
 @pytest.fixture(scope="session")
 def with_pose() -> Callable[..., LaserScan]:
-    """Give a function that makes the scan of a sensor which sits elsewhere, or sees otherwise."""
+    """Give a function that makes the scan of a sensor with another pose or other limits."""
 
     def with_pose(scan: LaserScan, **changes: object) -> LaserScan:
         settings = {

@@ -123,7 +123,7 @@ def test_the_beam_of_middle_length_speaks(ranges, middle):
 
 
 def test_a_beam_without_return_is_longer_than_a_hit():
-    """Its range is the limit of the sensor, so a single hit beside two free beams is outvoted."""
+    """Its range is the limit of the sensor, so a single hit next to two free beams is outvoted."""
     beams = Beams(np.zeros(3), np.array([10.0, 2.0, 10.0]), np.array([False, True, False]))
     _, chosen = by_direction(beams)
     assert not chosen.hit[0]

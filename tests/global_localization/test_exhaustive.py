@@ -119,7 +119,7 @@ def test_only_blocks_with_a_free_cell_are_tried():
     assert len(scores) == 2
 
 
-def test_blocks_that_nobody_has_seen_are_not_tried():
+def test_unseen_blocks_are_not_tried():
     cells = np.zeros((4, 8), np.int8)
     cells[0, 0] = OCCUPIED
     unseen = np.zeros(cells.shape, np.bool_)
@@ -133,7 +133,7 @@ def test_of_equal_headings_the_first_wins():
     cells = np.zeros((9, 9), np.int8)
     cells[4, 4] = OCCUPIED
     fields = MapFields(OccupancyGrid(cells, 1.0))
-    # A beam of no length scores alike in every heading.
+    # A beam of no length has the same score in every heading.
     hits = Beams(np.zeros(1), np.array([1e-6]), np.ones(1, np.bool_))
     tried, scores = ExhaustiveSearch(fields, PoseGrid(1, 24)).pose_scores(hits)
     assert (tried[:, 2] == 0.0).all()
@@ -194,7 +194,7 @@ def test_the_score_is_the_mean_over_the_beams(room):
 
 
 def test_beams_without_a_return_take_no_part(room):
-    """The paper knows end points only: the same scores with and without them."""
+    """The paper's score has end points only: it is the same with and without them."""
     truth = SE2(4.9, 5.1, 1.0)
     scan = scan_at(room, truth, range_max=4.0)
     assert scan.no_return.any()

@@ -156,7 +156,7 @@ CASES = {
 
 
 def figures(case: Case) -> dict[str, Any]:
-    """Return all that the law says about a case, rounded."""
+    """Return costs, probabilities and verdicts of a case, rounded."""
     matcher = ScanMatcher((case.map_of or case.plan).map())
     rng = np.random.default_rng(0)
     costs: dict[str, list[float]] = {"truth": [], "a little off": [], "turned": [], "anywhere": []}

@@ -1,4 +1,4 @@
-"""Scans that say little, or more than a map can hold."""
+"""Scans with few valid beams, or with more than a map contains."""
 
 from __future__ import annotations
 

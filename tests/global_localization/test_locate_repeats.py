@@ -19,25 +19,25 @@ LIDAR = Lidar(beams=360, sigma_m=0.01)
 
 
 @pytest.mark.slow
-def test_twice_and_from_many_threads_it_is_the_same(office_locator, told):
+def test_twice_and_from_many_threads_it_is_the_same(office_locator, content_of):
     grid = office_locator.fields.grid
     rng = np.random.default_rng(7)
     scans = [LIDAR.scan(grid, random_free_pose(grid, rng), rng) for _ in range(8)]
-    alone = [told(office_locator.locate(scan)) for scan in scans]
-    assert [told(office_locator.locate(scan)) for scan in scans] == alone
+    alone = [content_of(office_locator.locate(scan)) for scan in scans]
+    assert [content_of(office_locator.locate(scan)) for scan in scans] == alone
     with ThreadPoolExecutor(4) as pool:
         together = list(pool.map(office_locator.locate, scans * 2))
-    assert [told(result) for result in together] == alone * 2
+    assert [content_of(result) for result in together] == alone * 2
 
 
-def test_threads_may_share_a_locator_from_the_first_scan_on(room, told):
+def test_threads_may_share_a_locator_from_the_first_scan_on(room, content_of):
     """Nothing is prepared late in a way that two threads could disturb."""
     rng = np.random.default_rng(8)
     scan = LIDAR.scan(room.grid, random_free_pose(room.grid, rng), rng)
     fresh = ScanMatcher(room.grid)
     with ThreadPoolExecutor(4) as pool:
-        results = [told(result) for result in pool.map(fresh.locate, [scan] * 4)]
-    assert results == [told(ScanMatcher(room.grid).locate(scan))] * 4
+        results = [content_of(result) for result in pool.map(fresh.locate, [scan] * 4)]
+    assert results == [content_of(ScanMatcher(room.grid).locate(scan))] * 4
 
 
 PROGRAM = """
@@ -72,9 +72,9 @@ def test_the_scan_is_not_changed(office_locator):
     assert scan.ranges.tolist() == ranges.tolist()
 
 
-def test_a_cache_changes_nothing(room, tmp_path, told):
+def test_a_cache_changes_nothing(room, tmp_path, content_of):
     rng = np.random.default_rng(11)
     scan = LIDAR.scan(room.grid, random_free_pose(room.grid, rng), rng)
-    fresh = told(ScanMatcher(room.grid).locate(scan))
+    fresh = content_of(ScanMatcher(room.grid).locate(scan))
     for _ in range(2):
-        assert told(ScanMatcher(room.grid, cache_dir=tmp_path).locate(scan)) == fresh
+        assert content_of(ScanMatcher(room.grid, cache_dir=tmp_path).locate(scan)) == fresh

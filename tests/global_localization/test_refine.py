@@ -1,4 +1,4 @@
-"""Refinement ends at the pose that the scan was taken from, and knows how well it knows it."""
+"""Refinement ends at the true pose, with a covariance that matches its errors."""
 
 from __future__ import annotations
 

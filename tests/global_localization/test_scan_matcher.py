@@ -30,7 +30,7 @@ def rooms_locator() -> ScanMatcher:
     return ScanMatcher(identical_rooms(4))
 
 
-# --- a building without two alike rooms ---
+# --- a building without identical rooms ---
 
 
 @pytest.mark.parametrize("seed", range(25))
@@ -113,7 +113,7 @@ def test_any_reach_of_the_sensor(range_max, office_locator, found):
     assert hits >= 4
 
 
-# --- a building of alike rooms ---
+# --- a building of identical rooms ---
 
 
 @pytest.mark.parametrize("n", range(2, 9))
@@ -188,15 +188,15 @@ def test_a_map_of_one_kind_is_no_map(value, method):
 
 @pytest.mark.parametrize("max_poses", [1, LocateConfig().max_poses])
 def test_the_answer_does_not_depend_on_the_clock(
-    office_locator, maps_cache, told, monkeypatch, max_poses
+    office_locator, maps_cache, content_of, monkeypatch, max_poses
 ):
     grid, rng = office_locator.fields.grid, np.random.default_rng(0)
     matcher = ScanMatcher(grid, config=LocateConfig(max_poses=max_poses), cache_dir=maps_cache)
     scan = LIDAR.scan(grid, random_free_pose(grid, rng), rng)
-    idle = told(matcher.locate(scan))
+    idle = content_of(matcher.locate(scan))
     hours = itertools.count(0.0, 3600.0)
     monkeypatch.setattr("time.perf_counter", lambda: next(hours))
-    assert told(matcher.locate(scan)) == idle
+    assert content_of(matcher.locate(scan)) == idle
 
 
 def test_a_search_cut_short_is_never_unique(office_locator, maps_cache):

@@ -1,4 +1,4 @@
-"""The fast search equals the slow obvious one over the same score, whenever it says proven."""
+"""The fast search equals the slow obvious one over the same score."""
 
 from __future__ import annotations
 
@@ -187,7 +187,7 @@ def test_beams_longer_than_the_reach(hit, room):
 
 @pytest.fixture(scope="module")
 def tiles() -> MapFields:
-    """More than one look at the clock, and rows of several tiles."""
+    """Rows of several tiles."""
     fields = MapFields(random_map(5, 90, 200, 0.25))
     assert len(fields.positions.tile_rows) > 16
     return fields

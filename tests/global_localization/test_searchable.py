@@ -17,13 +17,13 @@ def test_a_map_of_one_kind_cannot_be_searched(value, missing):
         check_searchable(OccupancyGrid(np.full((5, 7), value, np.int8), 0.05))
 
 
-def test_free_space_that_nobody_has_seen_is_no_place_to_be():
+def test_unseen_free_space_cannot_be_searched():
     cells = np.array([[FREE, OCCUPIED]], np.int8)
     with pytest.raises(MapError, match="none of them free"):
         check_searchable(OccupancyGrid(cells, 0.05, unseen=np.array([[True, False]])))
 
 
-def test_one_wall_and_one_free_cell_can():
+def test_one_wall_and_one_free_cell_can_be_searched():
     check_searchable(OccupancyGrid(np.array([[FREE, OCCUPIED]], np.int8), 0.05))
 
 

@@ -57,7 +57,7 @@ def test_one_beam(yard, bearing, range_m, hit, kind):
     assert beam_classes(SENSOR[0], beam(bearing, range_m, hit=hit), yard).tolist() == [kind]
 
 
-def test_what_nobody_has_seen_is_unknown_whatever_the_thresholds_say(yard):
+def test_unseen_space_is_unknown_whatever_the_thresholds(yard):
     unseen = np.zeros(yard.grid.cells.shape, np.bool_)
     unseen[:, :70] = True  # up to x = 3.5 m; the beam ends at 3 m
     grid = OccupancyGrid(yard.grid.cells, RESOLUTION, unseen=unseen)
@@ -133,7 +133,7 @@ def test_each_pose_is_judged_alone(yard, seed, order):
 @settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60))
 def test_the_score_is_a_mean_over_the_beams(yard, seed, n):
-    """It lies between the best and the worst beam, and twice the same beams say the same."""
+    """It lies between the best and the worst beam, and the same beams twice have the same cost."""
     poses, beams = random_case(seed, n, 1)
     score = verify(poses, beams, yard).scores[0]
     alone = [

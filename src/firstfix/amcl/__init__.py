@@ -1,1 +1,1 @@
-"""The dynamic stage: adaptive Monte Carlo localization."""
+"""Adaptive Monte Carlo localization (AMCL)."""

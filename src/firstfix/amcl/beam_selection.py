@@ -1,4 +1,4 @@
-"""Which beams of a scan the filter uses."""
+"""Selection of the beams that the filter uses."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from firstfix.amcl.config import AmclConfig
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 
-# The reach of a sensor that names none (range_max infinite) and of a configuration that asks for
-# the sensor's own: a reading's likelihood anywhere is one over the reach.
+# Range limit of a sensor with an infinite range_max: the likelihood of a random reading is one over
+# the range limit.
 _FARTHEST_M = 1000.0
 
 
@@ -33,7 +33,7 @@ class SelectedBeams:
     range_max : float
         Reach of the sensor, m.
     chosen : int
-        Number of beams chosen, those without a valid reading included.
+        Number of beams selected, including those without a valid reading.
     """
 
     bearings: NDArray[np.float64]
@@ -53,7 +53,7 @@ class SelectedBeams:
 
 
 def select_beams(scan: LaserScan, config: AmclConfig) -> SelectedBeams:
-    """Choose evenly spaced beams.
+    """Select evenly spaced beams.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The bins in which particles count as being at the same place, and a table to find bins again."""
+"""Bins of poses, and a hash table of bins."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HEADINGS = 36
 
 EMPTY = -1
 
-# A belief that tracks fills some tens of bins: tables start small, and stay in the nearest cache.
+# A tracking belief fills some tens of bins: tables start small and stay in the L1 cache.
 FIRST_ENTRIES = 128
 
 
@@ -29,7 +29,7 @@ def bin_of(x: float, y: float, yaw: float) -> tuple[int, int, int]:
 
 @kernel
 def new_table(entries: int) -> NDArray[np.int64]:
-    """Make an empty hash table for so many bins: a column of keys, a column of values."""
+    """Make an empty hash table for this many bins: a column of keys, a column of values."""
     size = 16
     while size < 2 * entries:
         size *= 2
@@ -38,7 +38,7 @@ def new_table(entries: int) -> NDArray[np.int64]:
 
 @kernel
 def with_room(table: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Return a table of the same entries that can take one more beside so many; it may be new."""
+    """Return a table with the same entries and room for one more than ``count``; it may be new."""
     if 2 * (count + 1) <= table.shape[0]:
         return table
     wider = new_table(table.shape[0])

@@ -1,4 +1,4 @@
-"""The places that a belief is about: connected bins, each with its mass, mean and covariance."""
+"""Clusters of a belief: connected bins with mass, mean and covariance."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from firstfix.amcl.particles import Particles
 from firstfix.core.se2 import SE2
 from firstfix.fields.kernel_cache import kernel
 
-# A belief over a whole building falls into hundreds of clusters; the heaviest are described.
+# A belief over a whole building has hundreds of clusters; only the heaviest are described.
 MAX_CLUSTERS = 24
 
 
@@ -143,9 +143,9 @@ def _moments(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Sum up mass, mean pose and covariance of every group.
 
-    Headings are averaged as turns against the first of the group, wrapped: a group is connected and
-    far narrower than a half turn, or means nothing. It saves two thirds of the time. And sums stay
-    out of memory as long as particles are of one group, as most are in tracking: another third.
+    Headings are averaged as wrapped differences to the first of the group, which takes a third of
+    the time of sines and cosines: a group is far narrower than a half turn, or has no mean. Sums
+    stay in registers while consecutive particles are of one group, which saves another third.
     """
     mass, mean = _means(x, y, yaw, weight, emphasis, label, count)
     covariance = np.zeros((count, 3, 3))

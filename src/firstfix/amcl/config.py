@@ -1,4 +1,4 @@
-"""Settings of the dynamic stage: names, units and defaults of Nav2's AMCL."""
+"""Settings of the filter: names, units and defaults of Nav2's AMCL."""
 
 from __future__ import annotations
 
@@ -71,14 +71,14 @@ class AmclConfig:
     laser_min_range: float = setting(-1.0, "shortest range used, m; -1: the sensor's own", -1.0)
     laser_max_range: float = setting(100.0, "longest range used, m; -1: the sensor's own", -1.0)
     laser_likelihood_max_dist: float = setting(
-        2.0, "distance from a wall beyond which an end point is just wrong, m", 0.01
+        2.0, "distance from a wall at which the likelihood field saturates, m", 0.01
     )
     z_hit: float = setting(0.5, "weight of a hit in the mixture", 0.0, 1.0)
-    z_short: float = setting(0.05, "weight of something before the wall (beam)", 0.0, 1.0)
-    z_max: float = setting(0.05, "weight of no return (beam)", 0.0, 1.0)
-    z_rand: float = setting(0.5, "weight of anything at all", 1e-6, 1.0)
+    z_short: float = setting(0.05, "weight of an unexpected obstacle (beam)", 0.0, 1.0)
+    z_max: float = setting(0.05, "weight of a missing return (beam)", 0.0, 1.0)
+    z_rand: float = setting(0.5, "weight of a random reading", 1e-6, 1.0)
     sigma_hit: float = setting(0.2, "spread of a hit, m", 1e-3)
-    lambda_short: float = setting(0.1, "decay of the readings before the wall (beam), 1/m", 1e-6)
+    lambda_short: float = setting(0.1, "decay of unexpected obstacles (beam), 1/m", 1e-6)
     do_beamskip: bool = setting(
         False, "leave out beams that most particles do not explain (likelihood_field_prob)"
     )
@@ -89,10 +89,10 @@ class AmclConfig:
         0.3, "share of particles that must explain a beam for it to count", 0.0, 1.0
     )
     beam_skip_error_threshold: float = setting(
-        0.9, "share of beams skipped from which on none is", 0.0, 1.0
+        0.9, "if more than this fraction would be skipped, skip none", 0.0, 1.0
     )
     model_unknown_space: bool = setting(
-        False, "an end point in unknown space is neither in a wall nor in the free"
+        False, "treat end points in unknown space as uninformative (1 / range_max)"
     )
 
     min_particles: int = setting(500, "least number of particles", 1, 10_000_000)

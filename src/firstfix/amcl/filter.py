@@ -1,4 +1,4 @@
-"""The filter: one step is one sentence of the textbook."""
+"""One step of the particle filter, as in the textbook."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from firstfix.core.se2 import SE2
 Injection = Callable[[LaserScan, int, np.random.Generator], NDArray[np.float64]]
 """Draws new poses for a scan: x (m), y (m), yaw (rad) in the map frame, shape (n, 3)."""
 
-# At rest nothing moves the copies of a particle apart, and scan after scan the belief would shrink
-# to a few points. One scan at rest tells little that the last did not, so they are spread by about
-# what a map and a sensor leave open (roughening: Gordon, Salmond & Smith 1993).
+# At rest no motion noise separates the copies of a particle, and the belief would shrink to a few
+# points. Scans at rest are redundant, so particles are spread by about the error of map and sensor
+# (roughening: Gordon, Salmond & Smith 1993).
 _REST_M = 0.01
 _REST_RAD = math.radians(0.5)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FilterState:
-    """What the filter knows between two scans.
+    """State of the filter between two scans.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class FilterState:
     clusters : tuple of Cluster
         Its places, heaviest first.
     history : WeightHistory
-        How well it has explained the scans.
+        Running averages of how well it explains the scans.
     updates : int
         Number of scans used.
     """
@@ -120,8 +120,8 @@ def step(
         particles = _roughened(particles, rng)
     likelihood, fit = weigh(particles, select_beams(scan, config), sensor)
     particles = particles.reweighed(likelihood)
-    # Walls on one side cut a belief short there, and its mean lies off its peak. Where the robot
-    # most likely is, is asked of a belief that counts the scan double.
+    # A wall on one side truncates the belief there, and its mean lies off its mode. Estimate the
+    # mean from weights with the scan applied twice, which moves it towards the mode.
     clusters = find_clusters(particles, particles.reweighed(likelihood).weight)
     history = state.history if math.isnan(fit) else state.history.after(fit, config)
     updates = state.updates + 1
@@ -129,7 +129,7 @@ def step(
         fresh = np.empty((0, 3))
         if history.injected_share > 0.0:
             fresh = inject(scan, round(history.injected_share * len(particles)), rng)
-            history = WeightHistory()  # or it would go on injecting until all is chance
+            history = WeightHistory()  # or it would inject at every scan until no particle is left
         particles = _resampled(particles, fresh, config, rng)
     return FilterState(particles, clusters, history, updates)
 

@@ -1,4 +1,4 @@
-"""Where a belief begins: at a pose, at several places, or anywhere."""
+"""Initial beliefs: around a pose, around several places, or over free space."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many particles a belief needs: KLD-sampling (Fox 2003)."""
+"""Number of particles by KLD-sampling (Fox 2003)."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from firstfix.fields.kernel_cache import kernel
 
 
 def sample_size(bins: int, config: AmclConfig) -> int:
-    """Return how many particles a belief needs that fills so many bins.
+    """Return the number of particles for a belief that fills this many bins.
 
-    With as many, the Kullback-Leibler distance to the true belief stays below ``pf_err`` with the
-    probability whose standard normal quantile is ``pf_z`` (Fox 2003, eq. 7; the Wilson-Hilferty
+    With this number, the Kullback-Leibler distance to the true belief stays below ``pf_err`` with
+    the probability whose standard normal quantile is ``pf_z`` (Fox 2003, eq. 7; the Wilson-Hilferty
     approximation).
 
     Parameters
@@ -46,7 +46,7 @@ def sample_size(bins: int, config: AmclConfig) -> int:
 
 
 def adapted_size(particles: Particles, config: AmclConfig, rng: np.random.Generator) -> int:
-    """Draw from a belief until there are enough particles for the bins they fill; return how many.
+    """Return how many draws from a belief are enough for the bins that they fill.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The likelihood field: how near the walls the beams of a scan end.
+"""The likelihood field model: distances of end points to the nearest wall.
 
 Thrun, Burgard & Fox, "Probabilistic Robotics" (2005), table 6.3, with the parameters of Nav2.
 """
@@ -19,19 +19,19 @@ from firstfix.fields.distance import MAX_LIMIT, truncated_squares
 from firstfix.fields.kernel_cache import kernel
 
 # Logarithms are summed as integers: exact, so the same in any order and on any processor, and
-# vectorised without leave to reorder floating point. 20 000 beams stay within 31 bits.
+# vectorised without reordering floating point. 20 000 beams stay within 31 bits.
 _UNIT = 2.0**-12
 _LEAST_LIKELIHOOD = 1e-9
 
 # Sensors with range limits of their own whose tables are kept.
 _SENSORS = 4
 
-# Particles a kernel takes at a time: their coordinates and sums stay in the nearest cache.
+# Particles per block of a kernel: their coordinates and sums stay in the L1 cache.
 _BLOCK = 256
 
 
 class LikelihoodField:
-    """The map as the likelihood field model sees it, computed once.
+    """The likelihood field of a map.
 
     Parameters
     ----------
@@ -47,16 +47,16 @@ class LikelihoodField:
         limit = math.ceil(config.laser_likelihood_max_dist / grid.resolution)
         self.limit = max(1, min(MAX_LIMIT, limit))
         self.squares = _labelled_squares(grid, self.limit, config)
-        # As large as the map each: of the robot's sensors, not of every range limit ever seen.
+        # Each is as large as the map, so only those of the robot's sensors are kept.
         self._table = lru_cache(maxsize=_SENSORS)(self._build_table)
         prob = config.laser_model_type is SensorModel.LIKELIHOOD_FIELD_PROB
-        # As large as the map: not for those who skip nothing, and not anew for every scan.
+        # As large as the map: computed once, and only if beams are skipped.
         self._explained = self._near_walls() if prob and config.do_beamskip else None
 
     def log_likelihood(
         self, particles: Particles, beams: SelectedBeams
     ) -> tuple[NDArray[np.float64], int]:
-        """Judge every particle by a scan.
+        """Compute the log-likelihood of a scan at every particle.
 
         Parameters
         ----------
@@ -103,7 +103,7 @@ class LikelihoodField:
     def _unskipped(
         self, poses: Poses, hits: NDArray[np.float64], explained: NDArray[np.int32]
     ) -> NDArray[np.float64]:
-        """Leave out the beams that too few particles explain; keep all if too many would go."""
+        """Skip the beams that too few particles explain; keep all if too many would be skipped."""
         counts = np.zeros(len(hits), np.int64)
         _count_values(*poses, *_columns(hits), explained, *self._shape, counts)
         keep = counts / len(poses[0]) > self.config.beam_skip_threshold

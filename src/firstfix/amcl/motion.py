@@ -1,4 +1,4 @@
-"""How odometry moves the particles, and how far it may be wrong.
+"""Motion models: odometry with noise.
 
 Thrun, Burgard & Fox, "Probabilistic Robotics" (2005), table 5.6, and its extension to robots that
 move sideways, with alpha1 to alpha5 as ROS has always read them: times a *squared* motion they give
@@ -19,8 +19,8 @@ from firstfix.core.angles import angle_error, wrap
 from firstfix.core.se2 import SE2
 from firstfix.fields.kernel_cache import kernel
 
-# Below this a translation has no direction worth believing: its errors are those of a robot turning
-# in place (as in ROS).
+# Below this the direction of a translation is noise: its errors are those of a robot turning in
+# place (as in ROS).
 _NO_TRANSLATION_M = 0.01
 
 # The alphas are tuned on increments of about update_min_d and update_min_a. One long increment,
@@ -49,7 +49,7 @@ class Motion(NamedTuple):
 def propagate(
     particles: Particles, T_before_after: SE2, config: AmclConfig, rng: np.random.Generator
 ) -> Particles:
-    """Move every particle as odometry says, each with an error of its own.
+    """Move every particle by the odometry, each with its own noise.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def pieces(T_before_after: SE2, config: AmclConfig) -> tuple[int, SE2]:
     Returns
     -------
     tuple of int and SE2
-        Number of parts, and the part: so often chained, it is the increment.
+        Number of parts n, and the part: chained n times it is the increment.
     """
     length = math.hypot(T_before_after.x, T_before_after.y)
     turn = T_before_after.yaw
@@ -116,7 +116,7 @@ def _differential(T_before_after: SE2, config: AmclConfig) -> Motion:
     rot1 = math.atan2(T_before_after.y, T_before_after.x)
     rot2 = wrap(T_before_after.yaw - rot1)
     turns = (rot1, rot2) if trans >= _NO_TRANSLATION_M else (0.0, T_before_after.yaw)
-    # Backwards is no half turn and back: the noise follows the smaller angle.
+    # Driving backwards is not a half turn and back: the noise follows the smaller angle.
     turn1, turn2 = (min(angle_error(r, 0.0), angle_error(r, math.pi)) for r in turns)
     return Motion(
         direction=rot1,
@@ -158,7 +158,7 @@ def _drive(
     for i in range(n):
         astray = sigma_direction * np.float64(noise[0, i])
         ahead = length + sigma_length * np.float64(noise[1, i])
-        # No model errs in direction and to the left: they can share a draw.
+        # No model has noise both in direction and to the left: they share a draw.
         left = sigma_left * np.float64(noise[0, i])
         along = yaw[i] + direction + astray
         c, s = math.cos(along), math.sin(along)

@@ -1,4 +1,4 @@
-"""The beam model: what each beam should have measured, by casting it.
+"""The beam model: expected ranges by ray casting.
 
 Thrun, Burgard & Fox, "Probabilistic Robotics" (2005), table 6.1, with the parameters of Nav2.
 """
@@ -20,7 +20,7 @@ from firstfix.fields.raycast import cast_ray_leaping
 
 
 class RayModel:
-    """The map as the beam model sees it, computed once.
+    """The beam model of a map.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class RayModel:
     def log_likelihood(
         self, particles: Particles, beams: SelectedBeams
     ) -> tuple[NDArray[np.float64], int]:
-        """Judge every particle by a scan.
+        """Compute the log-likelihood of a scan at every particle.
 
         Parameters
         ----------
@@ -51,8 +51,8 @@ class RayModel:
         Returns
         -------
         tuple of ndarray, shape (n,), and int
-            Natural logarithm of the product of the likelihoods of all beams, and how many these
-            are; a beam without a return is one of them.
+            Natural logarithm of the product of the likelihoods of all beams, and the number of
+            beams, including those without a return.
         """
         config, resolution = self.config, self.grid.resolution
         T_base_laser, T_map_grid = beams.T_base_laser, self.grid.T_map_grid

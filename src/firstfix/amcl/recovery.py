@@ -1,4 +1,4 @@
-"""When the belief stops explaining the scans: augmented Monte Carlo localization.
+"""Recovery from a wrong belief: augmented Monte Carlo localization.
 
 Thrun, Burgard & Fox, "Probabilistic Robotics" (2005), table 8.3.
 """
@@ -12,7 +12,7 @@ from firstfix.amcl.config import AmclConfig
 
 @dataclass(frozen=True, slots=True)
 class WeightHistory:
-    """Slow and fast running averages of how well the particles explain the scans.
+    """Slow and fast running averages of the likelihood of the scans.
 
     Parameters
     ----------
@@ -47,5 +47,5 @@ class WeightHistory:
 
     @property
     def injected_share(self) -> float:
-        """Share of the particles to draw anew, 0 to 1: 0 unless the fit got worse lately."""
+        """Share of the particles to draw anew: 0 unless the fast average is below the slow one."""
         return max(0.0, 1.0 - self.fast / self.slow) if self.slow > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""Drawing particles in proportion to their weight."""
+"""Resampling: draws in proportion to weight."""
 
 from __future__ import annotations
 

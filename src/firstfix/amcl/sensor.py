@@ -1,4 +1,4 @@
-"""What a scan says about the particles."""
+"""Likelihood of a scan at every particle."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from firstfix.amcl.particles import Particles
 from firstfix.amcl.ray_model import RayModel
 from firstfix.core.grid import OccupancyGrid
 
-# Neighbouring beams see the same walls, the same person, the same fault of the map. Multiplied as
-# if each were a witness of its own, they make a belief far too sure of itself; so all beams of a
-# scan together count as this many (docs/decisions/0010).
-INDEPENDENT_BEAMS = 15
+# Neighbouring beams hit the same walls, the same person, the same error of the map. Multiplied as
+# if they were independent, they make a belief overconfident; so all beams of a scan together count
+# as this many effective beams (docs/decisions/0010).
+EFFECTIVE_BEAMS = 15
 
 
 class Sensor(Protocol):
@@ -43,7 +43,7 @@ def build_sensor(grid: OccupancyGrid, config: AmclConfig) -> Sensor:
     Returns
     -------
     Sensor
-        The model, ready to judge.
+        The sensor model.
     """
     if config.laser_model_type is SensorModel.BEAM:
         return RayModel(grid, config)
@@ -53,7 +53,7 @@ def build_sensor(grid: OccupancyGrid, config: AmclConfig) -> Sensor:
 def weigh(
     particles: Particles, beams: SelectedBeams, sensor: Sensor
 ) -> tuple[NDArray[np.float64], float]:
-    """Judge every particle by a scan.
+    """Compute the likelihood of a scan at every particle.
 
     Parameters
     ----------
@@ -67,12 +67,12 @@ def weigh(
     Returns
     -------
     tuple of ndarray, shape (n,), and float
-        Likelihood of the scan at each particle, 1 at the best; and how well the belief explains the
-        scan: geometric mean of the likelihoods of its beams, 1/m, NaN if no beam took part.
+        Likelihood of the scan at each particle, 1 at the best; and the fit of the belief: geometric
+        mean of the likelihoods of the beams, 1/m, NaN if no beam took part.
     """
     logs, used = sensor.log_likelihood(particles, beams)
     # No `@`: its order of summation, and so its rounding, may depend on the number of threads.
     mean = float((particles.weight * logs).sum())
     fit = math.exp(mean / used) if used else math.nan
-    share = min(1.0, INDEPENDENT_BEAMS / beams.chosen)
+    share = min(1.0, EFFECTIVE_BEAMS / beams.chosen)
     return np.exp(share * (logs - logs.max())), fit

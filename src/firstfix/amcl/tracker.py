@@ -1,4 +1,4 @@
-"""Following a robot: when to update, and where it is in between."""
+"""Tracking: when to update the filter, and the pose between updates."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Track:
 
 
 class Tracker:
-    """The dynamic stage for one map.
+    """Tracks a robot in one map by AMCL.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Tracker:
     def begin(
         self, particles: Particles, T_odom_base: SE2, scan: LaserScan, rng: np.random.Generator
     ) -> Track:
-        """Start with a belief and judge it by a first scan.
+        """Start with a belief and update it by a first scan.
 
         Parameters
         ----------
@@ -80,7 +80,7 @@ class Tracker:
     def follow(
         self, track: Track, T_odom_base: SE2, scan: LaserScan, rng: np.random.Generator
     ) -> Track:
-        """Take in a scan, if the robot has moved enough since the last update.
+        """Update by a scan if the robot has moved enough since the last update.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class Tracker:
     def update(
         self, track: Track, T_odom_base: SE2, scan: LaserScan, rng: np.random.Generator
     ) -> Track:
-        """Take in a scan in any case (Nav2: a no-motion update). Arguments as in `follow`."""
+        """Update by a scan in any case (Nav2: a no-motion update). Arguments as in `follow`."""
         increment = track.T_odom_base.inverse() @ T_odom_base
         state = step(track.state, increment, scan, self._sensor, rng, self._config, self._inject)
         return Track(state, T_odom_base)

@@ -1,1 +1,1 @@
-"""What the map knows, computed once per map."""
+"""Fields that the map alone determines, computed once per map."""

@@ -1,4 +1,4 @@
-"""How large an empty square surrounds every cell: what lets a ray leap."""
+"""The largest empty square around every cell, by which rays leap."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def chessboard_clearance(occupied: NDArray[np.bool_]) -> NDArray[np.uint8]:
     """Measure the 8-connected distance of every cell to the nearest wall.
 
     All cells less than n columns and less than n rows away from a cell with clearance n are not
-    occupied. Along walls, which buildings are made of, this square reaches farther than the disc of
-    the Euclidean distance less two half diagonals: 8.3 steps a ray instead of 12.7 on willow.
+    occupied. Along straight walls this square reaches farther than the disc of the Euclidean
+    distance less two half diagonals: 8.3 steps a ray instead of 12.7 on willow.
 
     Parameters
     ----------
@@ -40,11 +40,11 @@ def chessboard_clearance(occupied: NDArray[np.bool_]) -> NDArray[np.uint8]:
 def _sweep(occupied: NDArray[np.bool_], clearance: NDArray[np.uint8]) -> None:
     """Go down and up in straight and diagonal steps, then along each row.
 
-    A king's shortest way is some diagonal steps and then straight ones; so each cell needs its
+    A shortest chessboard path is some diagonal steps and then straight ones. So each cell needs its
     neighbours in the row only once, at the end, and all loops compile to vector instructions.
     """
     height, width = occupied.shape
-    # One cell of "nothing known" on both sides stands for the world outside.
+    # One cell of the largest clearance on both sides stands for the world outside.
     before = np.full(width + 2, np.uint8(MAX_CLEARANCE))
     nearest = np.empty(width, np.uint8)
     for r in range(height):
@@ -52,10 +52,10 @@ def _sweep(occupied: NDArray[np.bool_], clearance: NDArray[np.uint8]) -> None:
         _nearest_of_three(before, nearest)
         for c in range(width):
             row[c] = nearest[c] & np.uint8(np.uint8(wall[c]) - np.uint8(1))  # 0 in a wall
-        for c in range(width):  # a slice would compile NumPy's broadcasting: seconds
+        for c in range(width):  # a slice would compile NumPy's broadcasting, which takes seconds
             before[c + 1] = row[c]
     before[:] = MAX_CLEARANCE
-    # Steps beyond the ends of a row meet "nothing known".
+    # Steps beyond the ends of a row read the largest clearance.
     padded = np.full((2, width + 2 * _MARGIN), np.uint8(MAX_CLEARANCE))
     one, other = padded[0], padded[1]
     for r in range(height - 1, -1, -1):
@@ -82,9 +82,9 @@ def _nearest_of_three(before: NDArray[np.uint8], nearest: NDArray[np.uint8]) -> 
 def _look_along(
     row: NDArray[np.uint8], padded: NDArray[np.uint8], other: NDArray[np.uint8]
 ) -> None:
-    """Lower each cell of a row to that of any other plus the way there.
+    """Lower each cell of a row to the value of any other plus the distance to it.
 
-    The way is put together from steps of 1, 2, 4, ... 128 cells, each taken by all cells at once.
+    The distance is a sum of steps of 1, 2, 4, ... 128 cells, each taken by all cells at once.
     """
     n = row.size
     inner = padded[_MARGIN : _MARGIN + n]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from firstfix.fields import distance_kernels
 
 SATURATED = distance_kernels.SATURATED
-"""Manhattan distance of a cell that is farther from every wall than uint16 can say."""
+"""Manhattan distance of a cell that is farther from every wall than uint16 can hold."""
 
 MAX_LIMIT = 181
 """Largest limit of the truncated transform: twice its square still fits uint16."""
@@ -51,7 +51,7 @@ def euclidean_distance(occupied: NDArray[np.bool_]) -> NDArray[np.float32]:
         Distance, cells; inf everywhere if there is no wall.
     """
     distance = np.empty(occupied.shape, np.float32)
-    # The column distances live where the result will be: no memory beyond it.
+    # The column distances share the memory of the result.
     distance_kernels.euclidean(np.ascontiguousarray(occupied), distance.view(np.int32), distance)
     return distance
 
@@ -67,7 +67,7 @@ def truncated_squares(occupied: NDArray[np.bool_], limit: int) -> NDArray[np.uin
     occupied : ndarray of bool, shape (height, width)
         Where a wall is.
     limit : int
-        Distance from which on cells are alike, cells, 1 to `MAX_LIMIT`.
+        Distance at which the result saturates, cells, 1 to `MAX_LIMIT`.
 
     Returns
     -------

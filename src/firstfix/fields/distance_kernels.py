@@ -17,7 +17,7 @@ _CHUNK = 128
 
 # LLVM vectorises the sweeps over columns only if each loop is this plain: rows taken out as
 # one-dimensional views, one array written a loop, every sum cast back to its own width.
-# That is ten times the speed of the same sweeps written as one loop.
+# That is ten times as fast as the same sweeps written as one loop.
 
 
 @kernel
@@ -38,7 +38,9 @@ def manhattan(occupied: NDArray[np.bool_], distance: NDArray[np.uint16]) -> None
         row = distance[r]
         for c in range(width):
             near[c] = min(row[c], np.uint16(min(near[c], top) + one))
-        beside = SATURATED  # a wide integer: its neighbour in the row keeps it below
+        beside = (
+            SATURATED  # a wide integer: it never exceeds its neighbour in the row by more than one
+        )
         for c in range(width):
             beside = min(int(near[c]), beside + 1)
             row[c] = beside
@@ -78,7 +80,7 @@ def euclidean(
 def _lower_envelope(
     near: NDArray[np.int32], sites: NDArray[np.int64], starts: NDArray[np.int64]
 ) -> int:
-    """Find which columns u are nearest to some column of the row, and from where on."""
+    """Find the columns u that are nearest to some column of the row, and where each begins."""
     width = near.size
     last = -1
     for u in range(width):
@@ -116,7 +118,7 @@ def _squares_of_envelope(
         for c in range(starts[k], end):
             squares[c] = np.float64(c - v) ** 2 + across
         end = starts[k]
-    squares[:end] = np.inf  # no column knows a wall: there is none
+    squares[:end] = np.inf  # the map has no wall
 
 
 @kernel
@@ -133,7 +135,7 @@ def truncated(occupied: NDArray[np.bool_], limit: int, squares: NDArray[np.uint1
         for c in range(width):
             row[c] = near[c]
     near[:] = top
-    # A margin of the limit on both sides spares the inner loop every question about edges.
+    # With a margin of the limit on both sides the inner loop needs no checks at the edges.
     padded = np.full(width + 2 * limit, np.uint16(limit * limit))
     for r in range(height - 1, -1, -1):
         row, inner = squares[r], padded[limit : limit + width]
@@ -148,7 +150,7 @@ def truncated(occupied: NDArray[np.bool_], limit: int, squares: NDArray[np.uint1
 
 @kernel
 def _look_outward(window: NDArray[np.uint16], limit: int, best: NDArray[np.uint16]) -> None:
-    """Compare with columns ever farther away, until none can be nearer; window = best + margins."""
+    """Compare with columns ever farther away until none can be nearer; window = best + margins."""
     n = best.size
     for c in range(n):
         best[c] = window[limit + c]

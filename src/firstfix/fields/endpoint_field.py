@@ -14,7 +14,7 @@ UNIT_M = 0.05
 """What one count of the field stands for, m."""
 
 LIMIT_M = 0.5
-"""An end point this far from every wall, or farther, is simply wrong, m."""
+"""Distance at which the field saturates, m: farther end points are outliers."""
 
 LIMIT = round(LIMIT_M / UNIT_M)
 

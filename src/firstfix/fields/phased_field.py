@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# Rows are read in whole vectors and tiles, also where they reach beyond the map.
+# Rows are read in whole vectors and tiles, also beyond the edge of the map.
 _SLACK_ROWS = 17
 _SLACK = 64
 

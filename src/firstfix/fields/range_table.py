@@ -20,10 +20,10 @@ DIRECTIONS = 128
 """Directions, and headings of the search: 2.8 degrees, four 32-byte vectors."""
 
 UNIT_M = 0.1
-"""What one count of the table stands for, m."""
+"""Metres per count of the table."""
 
 REACH_M = 25.0
-"""Longest range of the table, m; what is farther reads as this."""
+"""Range at which the table saturates, m."""
 
 FARTHEST = round(REACH_M / UNIT_M)
 

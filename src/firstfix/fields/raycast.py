@@ -112,7 +112,7 @@ def cast_ray(
     while length < max_range_cells and 0 <= column < width and 0 <= row < height:
         if occupied[row, column]:
             return length
-        # Not summed up from step to step: every crossing has one value, whatever came before it.
+        # Computed anew, not accumulated: the length at a crossing does not depend on earlier steps.
         length_x = (column + line_x - x) * per_x
         length_y = (row + line_y - y) * per_y
         if length_x < length_y:
@@ -182,7 +182,7 @@ def cast_ray_leaping(
 
 @kernel
 def _is_inside_cell(along: float) -> bool:
-    """Tell whether rounding cannot have put a coordinate into the wrong cell."""
+    """Return whether a coordinate lies so far inside a cell that rounding cannot move it out."""
     return abs(along - math.floor(along + 0.5)) > _NEAR_LINE
 
 

@@ -1,8 +1,8 @@
-"""The positions that a search looks at: free blocks of cells, gathered into tiles.
+"""The positions of the search: free blocks of cells, sorted into tiles.
 
 A block of ``stride`` x ``stride`` cells is one position. Positions are stored tile by tile
-(16 rows x 64 columns of blocks), so that what a search needs of a tile lies together in memory and
-its inner loops have a fixed length that compiles to vector instructions without a remainder.
+(16 rows x 64 columns of blocks), so that the data of a tile lies together in memory and the
+inner loops have a fixed length that compiles to vector instructions without a remainder.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ from firstfix.fields.kernel_cache import kernel
 TILE_ROWS = 16
 TILE_COLUMNS = 64
 
-# Half a robot's width: a scan at the nearest position still resembles the true one.
+# Half a robot's width: at the nearest position the map predicts nearly the same scan.
 SPACING_M = 0.2
 
-# Above this a table of expected ranges passes 200 MB and the search a second: look coarser.
+# Above this the table of expected ranges exceeds 200 MB and the search half a second: the spacing
+# doubles.
 MAX_POSITIONS = 800_000
 
 

@@ -1,1 +1,1 @@
-"""The static stage: one scan, the whole map, no motion."""
+"""Global localization: one scan, the whole map, no motion."""

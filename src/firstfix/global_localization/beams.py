@@ -1,4 +1,4 @@
-"""Which beams of a scan are compared, and how a missing return counts."""
+"""Selection of the beams that are compared, and the meaning of a missing return."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from firstfix.core.angles import FULL_TURN
 from firstfix.core.scan import LaserScan
 from firstfix.fields.range_table import DIRECTIONS
 
-# Maps drift over such distances, and farther beams are too few to lose much.
+# Maps drift over longer distances, and few beams are longer.
 LONGEST_M = 30.0
 
-# Fewer beams on surfaces than this cannot tell places apart, whatever they say.
+# Fewer hits than this cannot distinguish places.
 FEWEST_HITS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Beams:
-    """Beams that say something, in the upright sensor frame.
+    """Valid beams in the upright sensor frame.
 
     Parameters
     ----------
     bearings : ndarray, shape (n,)
         Directions, rad, counter-clockwise.
     ranges : ndarray, shape (n,)
-        Distances, m; where nothing returned, the distance that was seen to be free.
+        Distances, m; without a return the distance that is free.
     hit : ndarray of bool, shape (n,)
         True where a surface returned the beam.
     """
@@ -40,11 +40,11 @@ class Beams:
         return len(self.ranges)
 
     def hits(self) -> Beams:
-        """Only the beams that met a surface."""
+        """Return only the beams that a surface returned."""
         return self._take(np.flatnonzero(self.hit))
 
     def thinned(self, n: int) -> Beams:
-        """At most n of the beams, evenly chosen."""
+        """Return at most n of the beams, evenly chosen."""
         if len(self) <= n:
             return self
         return self._take(np.linspace(0, len(self) - 1, n).round().astype(np.int64))
@@ -54,19 +54,19 @@ class Beams:
 
 
 def usable_beams(scan: LaserScan, longest_m: float = LONGEST_M) -> Beams:
-    """Choose the beams of a scan that say something.
+    """Select the valid beams of a scan.
 
     Parameters
     ----------
     scan : LaserScan
         The scan.
     longest_m : float
-        A beam that is longer counts as "nothing up to here", m.
+        A longer beam counts as free up to here, m.
 
     Returns
     -------
     Beams
-        Hits, and beams without a return where the sensor means it (REP 117: +inf).
+        Hits, and beams that the sensor reports as free up to its range limit (REP 117: +inf).
     """
     free_to = min(scan.range_max, longest_m)
     hit = scan.hit & (scan.ranges < free_to)
@@ -88,7 +88,7 @@ def by_direction(beams: Beams) -> tuple[NDArray[np.int64], Beams]:
     directions : ndarray of int64, shape (m,)
         Directions of the table that the scan has beams in, ascending.
     beams : Beams
-        For each of them the beam of middle length; bearings are those of the table.
+        For each of them the beam of median length; bearings are those of the table.
     """
     direction = np.rint(beams.bearings / FULL_TURN * DIRECTIONS).astype(np.int64) % DIRECTIONS
     order = np.lexsort((beams.ranges, direction))

@@ -49,7 +49,7 @@ FAST = PoseGrid(stride=4, headings=24)
 
 _HYPOTHESES = 10
 
-# No 2D LIDAR measures farther, and memory grows with the square of the longest beam.
+# No 2D LIDAR measures farther. Memory grows with the square of the longest beam.
 _LONGEST_M = 100.0
 
 # Eight of these fit uint16: twice as many to a vector as uint32.
@@ -92,7 +92,7 @@ class ExhaustiveSearch:
         Returns
         -------
         LocateResult
-            The paper publishes the lowest pose whatever the others are: UNIQUE, with probability 1,
+            The paper always publishes the lowest pose: UNIQUE, with probability 1,
             while the next lowest places are listed with probability 0; NO_MATCH if no beam hit.
         """
         started = time.perf_counter()
@@ -115,7 +115,7 @@ class ExhaustiveSearch:
         )
         return LocateResult(
             verdict=Verdict.UNIQUE,
-            reason="lowest PoseScore; the paper's method does not doubt it",
+            reason="lowest PoseScore; the paper's method always publishes it",
             hypotheses=hypotheses,
             search=SearchReport(len(tried) * poses.headings, 1.0, proven=True),
             elapsed_s=time.perf_counter() - started,
@@ -175,7 +175,7 @@ class ExhaustiveSearch:
 
 
 def _longest(fields: MapFields) -> float:
-    # A beam that is longer than the map ends outside it wherever the robot is.
+    # A beam longer than the map ends outside it from every pose.
     grid = fields.grid
     return min(_LONGEST_M, math.hypot(grid.width, grid.height) * grid.resolution)
 
@@ -183,7 +183,7 @@ def _longest(fields: MapFields) -> float:
 def _continued(pointscore: NDArray[np.uint16], margin: int) -> NDArray[np.uint16]:
     """Extend pointscore beyond the map.
 
-    The shortest 4-connected way from outside to a wall leads through the nearest cell of the map.
+    The shortest 4-connected path from outside to a wall leads through the nearest cell of the map.
     """
     height, width = pointscore.shape
     beyond_y, beyond_x = (

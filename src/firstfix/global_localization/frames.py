@@ -11,14 +11,14 @@ from firstfix.core.se2 import SE2
 
 
 def to_cells(grid: OccupancyGrid, scan: LaserScan, T_map_base: SE2) -> NDArray[np.float64]:
-    """Bring a robot's pose in the map to its sensor's pose in cells: the way back of `to_map`.
+    """Convert the base's pose in the map to the sensor's pose in cells: the inverse of `to_map`.
 
     Parameters
     ----------
     grid : OccupancyGrid
         The map.
     scan : LaserScan
-        Knows where the sensor sits.
+        Has the sensor's pose on the base.
     T_map_base : SE2
         The robot's pose.
 
@@ -37,14 +37,14 @@ def to_map(
     pose: NDArray[np.float64],
     covariance: NDArray[np.float64],
 ) -> tuple[SE2, NDArray[np.float64]]:
-    """Bring a sensor pose in cells to the robot's pose in the map.
+    """Convert the sensor's pose in cells to the base's pose in the map.
 
     Parameters
     ----------
     grid : OccupancyGrid
         The map.
     scan : LaserScan
-        Knows where the sensor sits.
+        Has the sensor's pose on the base.
     pose : ndarray, shape (3,)
         x, y (cells), heading (rad) of the sensor in the grid.
     covariance : ndarray, shape (3, 3)

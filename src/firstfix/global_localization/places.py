@@ -1,4 +1,4 @@
-"""Which poses are one place, and which are two."""
+"""Places: poses that count as one, and the selection of distinct ones."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _suppress(
         taken = False
         for j in kept[:n]:
             turn = abs(poses[i, 2] - poses[j, 2])
-            if turn >= FULL_TURN:  # hardly ever, and a remainder takes as long as all the rest
+            if turn >= FULL_TURN:  # rare, and a remainder takes as long as the rest of the loop
                 turn %= FULL_TURN
             if min(turn, FULL_TURN - turn) <= near_rad:
                 dx, dy = poses[i, 0] - poses[j, 0], poses[i, 1] - poses[j, 1]

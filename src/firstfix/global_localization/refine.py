@@ -1,7 +1,7 @@
-"""From a pose of the search grid to the pose the scan really fits: Gauss-Newton, twice.
+"""Refinement of poses from the search grid: Gauss-Newton on two residuals.
 
-First on the distance field, which pulls from far and costs next to nothing, for every place of the
-shortlist; then on cast rays, which know which side of a wall was seen, for the few that matter.
+First on the distance field, which has a wide basin of attraction and is cheap, for every place of
+the shortlist. Then on cast rays, which distinguish the two sides of a wall, for the best places.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ _FIELD_ROUNDS = 8
 # An end point this many sigmas from every wall hit something that is not in the map.
 _FIELD_GATE = 3.0
 
-# Prior of a step on the field, in beams that would hold the pose where it is: without it a corridor
-# lets the pose slide along. Half a beam for x and y; half a beam at a lever of 1 m for the heading.
+# Prior of a step on the field, in beams that hold the pose where it is: without a prior a pose in a
+# corridor slides along it. Half a beam for x and y; half a beam at a lever of 1 m for the heading.
 _STIFFNESS_BEAMS = 0.5
 _STIFFNESS_BEAMS_M2 = 0.5
-# The same on rays, which know more: just enough for a solvable system where no wall faces the ray.
+# The same on rays: just enough for a solvable system if no wall faces any ray.
 _RAY_STIFFNESS_BEAMS = 0.01
 _RAY_STIFFNESS_BEAMS_M2 = 0.0025
 
@@ -46,9 +46,9 @@ _RAY_ROUNDS = 8
 _SETTLED_M = 0.00025
 _SETTLED_RAD = 5e-5
 _RAY_SIGMA_M = 0.1
-# Rays that differ by more met something else.
+# A ray that differs by more hit something that is not in the map.
 _RAY_GATE_M = 0.3
-# A ray that grazes a wall (cosine of the angle to its normal) says nothing about the distance.
+# Least cosine between ray and wall normal: the range of a grazing ray is no constraint.
 _LEAST_SLANT = 0.1
 
 # Keeps the division by the longest coordinate of a step that is zero defined.
@@ -118,8 +118,8 @@ def refine_on_rays(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Move poses to where measured and cast ranges agree, below the size of a cell.
 
-    Point-to-line alignment (Censi 2008) against the wall that each ray meets; how deep in its cells
-    the walls lie is estimated along with the pose.
+    Point-to-line alignment (Censi 2008) against the wall that each ray meets; the depth of the
+    walls in their cells is estimated along with the pose.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def refine_on_rays(
         fields.distances,
         resolution,
     )
-    # The depth of the walls is not asked for: invert first, then leave it out.
+    # Marginalise the depth of the walls: invert first, then drop its row and column.
     covariances = np.linalg.inv(information)[:, :3, :3] * variances[:, None, None]
     return refined, covariances * _BEAMS_PER_EFFECTIVE_BEAM + _MAP_COVARIANCE
 
@@ -213,7 +213,7 @@ def _descend_field(
 @kernel
 def _solve(A: NDArray[np.float64], L: NDArray[np.float64], b: NDArray[np.float64]) -> None:
     """Solve A x = b by Cholesky's A = L L'; only the lower half of A counts, b becomes x."""
-    # Numba lends NumPy's solver only where SciPy is installed, which it is not at run time.
+    # Numba's version of NumPy's solver needs SciPy, which is no dependency.
     n = b.shape[0]
     for i in range(n):
         for j in range(i + 1):

@@ -1,4 +1,4 @@
-"""The conductor of the static stage: one scan in, one answer out."""
+"""Global localization of one scan in one map."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from firstfix.global_localization.searchable import check_positions, check_searc
 from firstfix.global_localization.verdict import judge, nothing_to_match, place_probabilities
 from firstfix.global_localization.verify import Verification, verified_place, verify
 
-# A third of the beams sorts out most places; the rest is spent on those that stay.
+# A third of the beams rejects most places; all beams rank the rest.
 FIRST_LOOK_BEAMS = 60
 SECOND_LOOK_PLACES = 48
 
@@ -37,7 +37,7 @@ _LISTED_SHARE = 0.01
 
 
 class ScanMatcher:
-    """Finds scans in one map, anywhere, without a guess.
+    """Locates scans anywhere in one map, without an initial pose.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class ScanMatcher:
         return f"<ScanMatcher {self.method.value} in {self.fields.grid!r}>"
 
     def score_poses(self, scan: LaserScan, poses: Sequence[SE2]) -> tuple[Hypothesis, ...]:
-        """Tell how well a scan fits each of some poses: `firstfix.global_localization.scoring`.
+        """Score poses by a scan: `firstfix.global_localization.scoring.score_poses`.
 
         Parameters
         ----------
@@ -181,7 +181,7 @@ def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateRe
     ranked = distinct_places(poses, second_look.scores, resolution, config.hypotheses)
     poses = poses[ranked[: worth_listing(second_look.scores[ranked], len(beams))]]
     on_rays, covariances = refine_on_rays(poses, beams, fields)
-    # Rays are sharper, but in a map with smeared walls they can do harm: the better pose stays.
+    # Rays are more precise, but worse in a map with smeared walls: keep the better pose of the two.
     poses = np.concatenate([on_rays, poses])
     covariances = np.concatenate([covariances, covariances])
     verification = verify(poses, beams, fields)
@@ -229,6 +229,6 @@ def _judge(
     )
     if report.proven:
         return verdict, reason
-    # What was not searched may hold a better place: never sure of a place then.
+    # The part that was not searched may contain a better place.
     unseen = f"; max_poses left {1.0 - report.searched:.0%} of the map unsearched"
     return (Verdict.AMBIGUOUS if verdict is Verdict.UNIQUE else verdict), reason + unseen

@@ -1,4 +1,4 @@
-"""Judging poses that somebody else proposes, by the evidence of the static stage."""
+"""Scores of given poses, a search around a pose, and the class of each beam."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from firstfix.global_localization.verify import (
     verify,
 )
 
-# Refinement may mend what a tracker leaves open, not find another place.
-_SAME_PLACE_M = 0.3
-_SAME_PLACE_RAD = math.radians(10.0)
+# Refinement corrects the small error of a tracked pose; it must not find another place.
+_REFINED_M = 0.3
+_REFINED_RAD = math.radians(10.0)
 
-# The neighbourhood in which a slip is looked for. Refinement pulls in what is half a step off.
+# The neighbourhood of a slip. Refinement corrects errors of half a step.
 _NEAR_M = 0.9
 _NEAR_STEP_M = 0.3
 _NEAR_RAD = math.radians(40.0)
@@ -46,7 +46,7 @@ _OUTSIDE_M = 1.0
 
 
 def score_poses(scan: LaserScan, poses: Sequence[SE2], fields: MapFields) -> tuple[Hypothesis, ...]:
-    """Tell how well a scan fits each of some poses, allowing for small errors.
+    """Score poses by how well a scan fits there, allowing for small errors.
 
     Parameters
     ----------
@@ -68,21 +68,21 @@ def score_poses(scan: LaserScan, poses: Sequence[SE2], fields: MapFields) -> tup
     given = np.array([to_cells(fields.grid, scan, pose) for pose in poses])
     refined = _held(refine_on_field(given, beams, fields), given, fields.grid.resolution)
     verification = verify(np.concatenate([refined, given]), beams, fields)
-    unsaid = np.zeros((3, 3))
+    unknown = np.zeros((3, 3))
     n = len(given)
     better = np.where(
         verification.scores[:n] < verification.scores[n:], np.arange(n), np.arange(n) + n
     )
     return tuple(
         verified_place(
-            fields.grid, scan, verification, i, unsaid, _alone(verification, i, beams, fields.grid)
+            fields.grid, scan, verification, i, unknown, _alone(verification, i, beams, fields.grid)
         )
         for i in better.tolist()
     )
 
 
 def search_locally(scan: LaserScan, T_map_base: SE2, fields: MapFields) -> Hypothesis:
-    """Find the best pose around a given one: within 0.9 m and 40 degrees, and what these pull in.
+    """Find the best pose within about 0.9 m and 40 degrees of a given one.
 
     Parameters
     ----------
@@ -179,9 +179,9 @@ def _alone(verification: Verification, i: int, beams: Beams, grid: OccupancyGrid
 def _held(
     refined: NDArray[np.float64], given: NDArray[np.float64], resolution: float
 ) -> NDArray[np.float64]:
-    """Take back refinements that went to another place."""
-    far = np.hypot(*(refined - given)[:, :2].T) * resolution > _SAME_PLACE_M
-    turned = np.abs(wrap(refined[:, 2] - given[:, 2])) > _SAME_PLACE_RAD
+    """Undo refinements that moved to another place."""
+    far = np.hypot(*(refined - given)[:, :2].T) * resolution > _REFINED_M
+    turned = np.abs(wrap(refined[:, 2] - given[:, 2])) > _REFINED_RAD
     return np.where((far | turned)[:, None], given, refined)
 
 

@@ -1,14 +1,14 @@
-"""Every position, every heading: the one exhaustive look at the whole map.
+"""Exhaustive search of the whole map: every position, every heading.
 
-Two scores are added for each pose, because each sees what the other cannot:
+Two scores are added for each pose, because each has a weakness that the other has not:
 
-- *end points*: how far the beams end from the nearest wall (the paper's score, truncated). Blind to
+- *end points*: how far the beams end from the nearest wall (the paper's score, truncated). Ignores
   walls that a beam passes through.
-- *ranges*: how the beams compare with the ranges that the map predicts. Sees walls, but stumbles
-  where a hand's breadth changes what is visible.
+- *ranges*: how the beams compare with the ranges that the map predicts. Accounts for walls, but
+  changes abruptly where a few centimetres decide what is visible.
 
-Both are sums of contiguous bytes (see `fields.phased_field`, `fields.range_table`), so looking at
-everything takes milliseconds, and the optimum over the grid is proven by having seen it all.
+Both are sums of contiguous bytes (see `fields.phased_field`, `fields.range_table`), so the search
+takes milliseconds. It scores every pose of the grid, so the optimum over the grid is proven.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ THROUGH_LIMIT = np.uint8(10)
 SHORT_LIMIT = np.uint8(4)
 NO_RETURN_LIMIT = np.uint8(5)
 
-# The best heading is kept for each eighth of a turn: a place that fits both ways round stays two.
+# The best heading is kept for each eighth of a turn: a place that fits in two directions is two
+# candidates.
 SECTORS = 8
 
 # Two by two positions and one sector are one place of the shortlist.
@@ -67,13 +68,13 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class _Queries:
-    """A scan, turned into what the kernels add up."""
+    """A scan as the kernels read it."""
 
     offsets: NDArray[np.int64]  # (DIRECTIONS, n_endpoints) into MapFields.endpoints
     directions: NDArray[np.int64]  # (n_ranges,)
     counts: NDArray[np.uint8]  # (n_ranges,) ranges, counts
-    through: NDArray[np.uint8]  # (n_ranges,) most that seeing through a wall may cost
-    short: NDArray[np.uint8]  # (n_ranges,) most that falling short may cost
+    through: NDArray[np.uint8]  # (n_ranges,) largest cost of a beam through a wall
+    short: NDArray[np.uint8]  # (n_ranges,) largest cost of a short beam
     endpoint_weight: np.int32  # _SCORE_UNITs per count
     range_weight: np.int32
 
@@ -124,7 +125,7 @@ def _queries(beams: Beams, fields: MapFields) -> _Queries:
     ends = ends.thinned(ENDPOINT_BEAMS)
     directions, seen = by_direction(beams)
     keep = np.linspace(0, len(seen) - 1, min(RANGE_BEAMS, len(seen))).round().astype(np.int64)
-    # The kernel takes four beams at a time; what is missing may cost nothing.
+    # The kernel takes four beams at a time; padding costs nothing.
     padding = -len(keep) % 4
     hit = seen.hit[keep]
     counts = np.minimum(np.rint(seen.ranges[keep] / range_table.UNIT_M), range_table.FARTHEST)
@@ -134,7 +135,7 @@ def _queries(beams: Beams, fields: MapFields) -> _Queries:
         counts=np.pad(counts.astype(np.uint8), (0, padding)),
         through=np.pad(np.where(hit, THROUGH_LIMIT, NO_RETURN_LIMIT), (0, padding)),
         short=np.pad(np.where(hit, SHORT_LIMIT, np.uint8(0)), (0, padding)),
-        # Beams that met nothing have no end point: a mean over all beams, not over the hits.
+        # Beams without a return have no end point: the mean is over all beams, not over the hits.
         endpoint_weight=_weight(endpoint_field.UNIT_M * len(hits) / len(beams) / max(1, len(ends))),
         range_weight=_weight(range_table.UNIT_M / len(keep)),
     )
@@ -155,7 +156,7 @@ def _weight(metres_per_count: float) -> np.int32:
 
 
 def _spread(n: int) -> NDArray[np.int64]:
-    """Visit every 16th tile first: a search cut short has looked everywhere a little."""
+    """Order tiles so that a search cut short has scored some in every part of the map."""
     return np.concatenate([np.arange(start, n, 16) for start in range(16)])
 
 
@@ -180,7 +181,7 @@ def _score_tiles(
 
 def _best_places(best: NDArray[np.int32], fields: MapFields, shortlist: int) -> Candidates:
     flat = best.ravel()
-    # A place has at most _BIN² entries here: so many of the lowest hold all places asked for.
+    # A place has at most _BIN² entries here: this many of the lowest contain all places requested.
     lowest = min(shortlist * _BIN**2, int(np.count_nonzero(flat != _UNSEEN)))
     if lowest == 0:
         return Candidates(np.empty((0, 3)), np.empty(0))
@@ -278,7 +279,7 @@ def _add_endpoints(
     ends: NDArray[np.uint16],
 ) -> None:
     n = offsets.shape[1]
-    # Unsigned indices spare the vectoriser the question whether they count from the end.
+    # Unsigned indices cannot count from the end of an array, so that LLVM can vectorise the loop.
     pitch = np.uint64(columns)
     ends[:] = 0
     for h in range(DIRECTIONS):

@@ -1,4 +1,4 @@
-"""How likely each place is, and whether the best may be published."""
+"""Probabilities of places, and the verdict."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 from firstfix.core.estimate import Evidence, LocateResult, SearchReport, Verdict
 from firstfix.core.scan import LaserScan
 
-# How noisy this scan is in this map (people, moved chairs, a careless drawing) is not known
-# beforehand. Left open, it makes the likelihood of a place a power of its mean cost (the marginal
-# over an unknown scale, as Student's t comes from Gauss): what counts is the ratio of two costs,
-# not their difference. The exponent is half the number of independent things that a scan sees,
-# fewer if it has few beams; the floor is the cost of noise alone. docs/decisions/0005 has the
-# measurements.
+# The noise of a scan in a map (people, moved chairs, an imprecise drawing) is unknown beforehand.
+# Marginalised over this unknown scale (as Student's t comes from Gauss), the likelihood of a place
+# is a power of its mean cost: the ratio of two costs counts, not their difference. The exponent is
+# half the number of independent measurements in a scan, fewer if it has few beams; the floor is the
+# cost of sensor noise alone. docs/decisions/0005 has the measurements.
 _EXPONENT = 12.0
 _BEAMS_FOR_EXPONENT = 30
 _FLOOR = 0.2
@@ -41,7 +40,7 @@ def place_probabilities(scores: NDArray[np.float64], beams: int) -> NDArray[np.f
     Returns
     -------
     ndarray, shape (n,)
-        Probability of each place; what is missing to 1 is that of a place that is not listed.
+        Probability of each place; the rest to 1 is the probability of a place that is not listed.
     """
     logs = log_likelihoods(np.append(scores, _WRONG_MAP_COST), beams)
     likelihoods: NDArray[np.float64] = np.exp(logs - logs.max())
@@ -72,7 +71,7 @@ def log_likelihoods(scores: NDArray[np.float64], beams: int) -> NDArray[np.float
 def judge(
     probabilities: NDArray[np.float64], best: Evidence, unique_probability: float
 ) -> tuple[Verdict, str]:
-    """Decide what a person, or a robot, may do with a result.
+    """Decide whether the best place may be published.
 
     Parameters
     ----------
@@ -118,7 +117,7 @@ def count_rivals(probabilities: NDArray[np.float64]) -> int:
 
 
 def nothing_to_match(scan: LaserScan, hits: int, needed: int, elapsed_s: float) -> LocateResult:
-    """Answer a legal scan with fewer beams on surfaces than are needed."""
+    """Return NO_MATCH for a valid scan with too few hits."""
     return LocateResult(
         verdict=Verdict.NO_MATCH,
         reason=f"only {hits} of {len(scan)} beams measured a surface, {needed} are needed: "

@@ -1,4 +1,4 @@
-"""How well a pose explains a scan, beam by beam, with every wall seen."""
+"""The cost of a scan at a pose, and the class of each beam, by ray casting."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from firstfix.global_localization.frames import to_map
 BEAMS = 180
 """Most beams of a scan that are compared, evenly chosen."""
 
-# Where an end point lies around a wall: 0.1 m of map and pose error, and a few beams anywhere.
+# Distribution of end points around a wall: 0.1 m of map and pose error, and some outliers.
 _SIGMA_M = 0.1
 _INLIER, _OUTLIER = 0.96, 0.02
 
-# A beam that passes a wall by more than this has seen through it; that costs as much as six beams
-# that end a little off. Being short is what people and moved chairs do: it costs little.
+# A beam that passes a wall by more than this goes through it; that costs as much as six beams that
+# end a little off. People and moved chairs make beams short, so a short beam costs little.
 _THROUGH_M = 0.3
 _THROUGH_COST = 2.0
 _THROUGH_LIMIT_M = 1.0
 _SHORT_LIMIT_M = 0.4
 _INSIDE_WALL_COST = 6.0
 
-# A missing return may be glass or black paint: half as telling as a hit.
+# A missing return may be glass or black paint: half the weight of a hit.
 _NO_RETURN_WEIGHT = 0.5
 
 # Distance from the walls that an end point outside the map is given: an outlier.
@@ -122,7 +122,7 @@ def verified_place(
     covariance: NDArray[np.float64],
     probability: float,
 ) -> Hypothesis:
-    """Bring a pose that was verified to a hypothesis in the map.
+    """Return the hypothesis for a verified pose.
 
     Parameters
     ----------
@@ -177,8 +177,8 @@ def _compared(
     poses: NDArray[np.float64], used: Beams, fields: MapFields
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.uint8]]:
     """Return scores (n,), counts (n, 4) and classes (n, beams)."""
-    # Neighbours on a near wall repeat one another, far beams each see something else: between
-    # counting every beam (weight 1) and every metre of wall (weight range) lies the root.
+    # Neighbouring beams on a near wall are redundant, far beams are not. The root lies between the
+    # same weight for every beam and the same weight for every metre of wall.
     weights = np.sqrt(used.ranges) * np.where(used.hit, 1.0, _NO_RETURN_WEIGHT)
     weights /= weights.sum()
     scores = np.empty(len(poses))
@@ -226,7 +226,7 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
         cos, sin = math.cos(poses[k, 2]), math.sin(poses[k, 2])
         column, row = math.floor(poses[k, 0]), math.floor(poses[k, 1])
         if 0 <= column < width and 0 <= row < height and clearance[row, column] == 0:
-            # No sensor sees from within a wall, though all that is very near would fit there.
+            # A sensor cannot stand in a wall, although very short beams would fit there.
             scores[k] = _INSIDE_WALL_COST
             counts[k, _THROUGH] = ranges.shape[0]
             classes[k] = _THROUGH
