@@ -268,6 +268,23 @@ class Visit:
         }"""
         return tuple(self.page.evaluate(script, [canvas, *self.pixel(x, y)]))
 
+    def colour_of(self, selector: str) -> str:
+        """Return the colour of a text, as rgb(...)."""
+        element = f"document.querySelector({selector!r})"
+        return str(self.page.evaluate(f"getComputedStyle({element}).color"))
+
+    def colour_variable(self, name: str) -> str:
+        """Return a colour of the style sheet by its name, as rgb(...)."""
+        script = """(name) => {
+            const probe = document.createElement("i");
+            probe.style.color = `var(--${name})`;
+            document.body.append(probe);
+            const { color } = getComputedStyle(probe);
+            probe.remove();
+            return color;
+        }"""
+        return str(self.page.evaluate(script, name))
+
     def shot(self, path: Path) -> None:
         """Take a picture, for people to look at."""
         self.page.screenshot(path=path)

@@ -38,7 +38,7 @@ def test_a_restarted_robot_is_found_again(visit: Visitor, chromium: Any) -> None
     page.page.wait_for_selector("#connection-lost", state="visible")
     assert page.data("connected") == "false"
     page.page.click("#relocalize")
-    page.page.wait_for_selector("#complaint", state="visible")
+    page.page.wait_for_selector("#error-notice", state="visible")
     server.start()
     try:
         page.page.wait_for_selector("#connection-lost", state="hidden", timeout=60_000)

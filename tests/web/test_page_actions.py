@@ -66,8 +66,8 @@ def test_a_press_without_a_pull_says_nothing(page: Visit) -> None:
     before = page.events()
     page.page.click("#mode-pose")
     page.click_on_map(20.0, 12.0)
-    page.page.wait_for_selector("#complaint", state="visible")
-    assert "pull" in page.page.inner_text("#complaint")
+    page.page.wait_for_selector("#error-notice", state="visible")
+    assert "drag" in page.page.inner_text("#error-notice")
     assert not [text for text in page.events() if "Hint from" in text and text not in before]
 
 
@@ -162,6 +162,10 @@ def test_picking_a_place_resolves_an_ambiguous_start(
     page.wait_for_state("LOCALIZED")
     wait_until(lambda: is_near_truth(page, 0.2, 0.2), lambda: f"{page.pose()}, not {truth}")
     assert page.page.locator(".place").count() == 0
+    # Evidence has not decided, so the state is not shown in its green.
+    assert page.data("chosen") == "true"
+    assert "A person chose this place. 4 places fit" in page.page.inner_text("#verdict")
+    assert page.colour_of("#state h2") == page.colour_variable("chosen")
 
 
 def test_a_carried_robot_is_searched_and_found(page: Visit) -> None:
@@ -198,8 +202,8 @@ def test_a_goal_is_driven_to(page: Visit) -> None:
 def test_what_cannot_be_done_is_said(page: Visit) -> None:
     page.page.click("#mode-goal")
     page.click_on_map(35.0, 1.0)  # outside of the building
-    page.page.wait_for_selector("#complaint", state="visible")
-    assert page.page.inner_text("#complaint")
+    page.page.wait_for_selector("#error-notice", state="visible")
+    assert page.page.inner_text("#error-notice")
 
 
 def test_relocalize_forgets_and_searches(page: Visit) -> None:
@@ -211,7 +215,7 @@ def test_relocalize_forgets_and_searches(page: Visit) -> None:
 def test_pause_holds_the_robot(page: Visit, office_server: Server) -> None:
     page.page.click("#pause")
     page.page.wait_for_selector("#paused", state="visible")
-    assert page.page.inner_text("#pause-text") == "Go on"
+    assert page.page.inner_text("#pause-text") == "Resume"
     stamp = wait_until(
         lambda: held_stamp(page, office_server), lambda: f"{office_server.status()['stamp']} stays"
     )

@@ -1,14 +1,14 @@
-/** What a person may do to the robot, and the mode that the next press on the map is in. */
+/** The commands, and the mode that decides what a press on the map does. */
 
 const MODES = {
   pose: {
-    text: "Press where the robot stands, pull towards where it looks.",
+    text: "Press where the robot stands, then drag in the direction it faces.",
     keys: "Arrows move, Shift + ← → turn, Enter sets.",
   },
-  goal: { text: "Press where the robot shall drive.", keys: "Arrows move, Enter sends." },
+  goal: { text: "Click where the robot should drive.", keys: "Arrows move, Enter sends." },
   carry: {
-    text: "Press where the robot is put down, pull towards where it will look.",
-    keys: "Arrows move, Shift + ← → turn, Enter drops.",
+    text: "Press where the robot is set down, then drag in the direction it faces.",
+    keys: "Arrows move, Shift + ← → turn, Enter sets down.",
   },
 };
 
@@ -23,7 +23,7 @@ export class Actions {
    * @param {Scene} scene
    * @param {View} view
    * @param {Notices} notices
-   * @param {() => void} onChange the map must be drawn anew
+   * @param {() => void} onChange the map must be redrawn
    */
   constructor(connection, scene, view, notices, onChange) {
     Object.assign(this, { connection, scene, view, notices, onChange });
@@ -41,7 +41,7 @@ export class Actions {
     });
   }
 
-  /** What this viewer may do, as `hello` says. */
+  /** Show what this viewer may do, from `hello`. */
   allow(maySteer, abilities) {
     this.#maySteer = maySteer;
     this.#abilities = new Set(maySteer ? ["pose", ...abilities] : []);
@@ -68,13 +68,13 @@ export class Actions {
     else if (this.#abilities.has(mode)) this.#enter(mode);
   }
 
-  /** By keys a draft must stand somewhere before it can be moved. */
+  /** With keys, the draft starts somewhere before it is moved. */
   toggleModeByKey(mode) {
     this.toggleMode(mode);
     if (this.scene.mode === mode) this.#beginDraft();
   }
 
-  /** By a long press; false for those who may only watch. */
+  /** By a long press; false on a read-only server. */
   enterPoseMode() {
     if (this.#maySteer && this.scene.mode !== "pose") this.#enter("pose");
     return this.#maySteer;
@@ -87,8 +87,8 @@ export class Actions {
   #beginDraft() {
     const { scene, view } = this;
     const [x, y] = view.toMap(...view.middle);
-    const believed = scene.state?.pose;
-    const [atX, atY, yaw] = scene.mode === "carry" ? [x, y, 0] : (believed ?? [x, y, 0]);
+    const pose = scene.state?.pose;
+    const [atX, atY, yaw] = scene.mode === "carry" ? [x, y, 0] : (pose ?? [x, y, 0]);
     scene.draft = { kind: scene.mode, x: atX, y: atY, yaw };
     this.onChange();
   }
@@ -105,7 +105,7 @@ export class Actions {
     this.onChange();
   }
 
-  /** Send what was drawn. */
+  /** Send the draft. */
   set() {
     const { scene } = this;
     const draft = scene.draft;
@@ -138,8 +138,8 @@ export class Actions {
     this.#send({ type: "pause", paused: !this.scene.state?.paused });
   }
 
-  needsPull() {
-    this.notices.complain("Press, then pull in the direction in which the robot looks.");
+  needsDrag() {
+    this.notices.showError("Press where the robot stands, then drag in the direction it faces.");
   }
 
   #showPeople() {
@@ -153,7 +153,7 @@ export class Actions {
 
   #send(message) {
     const sent = this.connection.send(message);
-    if (!sent) this.notices.complain("Not connected: nothing was sent.");
+    if (!sent) this.notices.showError("Not connected. Nothing was sent.");
     return sent;
   }
 }

@@ -1,10 +1,10 @@
-/** How the view moves by itself and by buttons: fit, follow, zoom; and the ruler that tells its scale. */
+/** The view: fit, follow, zoom, and the ruler with its scale. */
 
 import { roundStep } from "./layers/grid.js";
 
 const FOLLOW_SCALE = 45; // px per metre, at least, while the robot is followed
 const EASE_MS = 140;
-const LET_GO_PX = 60; // who drags the robot so far from the middle does not want to follow it
+const LET_GO_PX = 60; // dragging the robot this far from the middle ends following
 const BUTTON_ZOOM = 1.4;
 
 const byId = (id) => document.getElementById(id);
@@ -38,7 +38,7 @@ export class Camera {
     this.#setFollow(!this.#follows);
   }
 
-  /** Somebody moved the map. */
+  /** The map was moved by hand. */
   movedByHand() {
     const pose = this.scene.state?.pose;
     if (this.#follows && pose) {
@@ -57,7 +57,7 @@ export class Camera {
     this.#showRuler();
   }
 
-  /** Poses come 20 times a second, the screen is drawn more often. */
+  /** Poses arrive 20 times a second; the screen is drawn more often. */
   #glide([x, y], elapsed) {
     const { view } = this;
     const [dx, dy] = [x - view.x, y - view.y];

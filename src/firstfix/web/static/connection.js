@@ -1,4 +1,4 @@
-/** The WebSocket to the robot: comes back by itself, and asks for a token where one is needed. */
+/** The WebSocket: reconnects, and asks for a token where one is needed. */
 
 import { readFrame } from "./frames.js";
 import { authorization, token } from "./token.js";
@@ -26,8 +26,8 @@ export class Connection {
     const socket = new WebSocket(url);
     this.#socket = socket;
     socket.binaryType = "arraybuffer";
-    // A browser can give a WebSocket no header, and in the URL a token would be logged. Without one
-    // something is said too, so that a robot that wants one need not wait for it.
+    // Browsers cannot add headers to a WebSocket, and a token in the URL would be logged. An empty
+    // token is sent, too, so that a server that needs one refuses at once.
     socket.onopen = () => this.send({ type: "token", token: token() ?? "" });
     socket.onmessage = ({ data }) => this.#take(data);
     socket.onclose = ({ code }) => {
@@ -35,7 +35,7 @@ export class Connection {
     };
   }
 
-  /** Send a message; false if there is nobody to send it to. */
+  /** Send a message; false if there is no connection. */
   send(message) {
     if (this.#socket?.readyState !== WebSocket.OPEN) return false;
     this.#socket.send(JSON.stringify(message));
@@ -59,7 +59,7 @@ export class Connection {
       this.listener.onTokenAsked();
       return;
     }
-    if (this.#socket) return; // opened by hand meanwhile
+    if (this.#socket) return; // opened by the user meanwhile
     const wait = this.#wait;
     this.#wait = Math.min(2 * wait, LONGEST_WAIT_MS);
     this.#timer = setTimeout(() => this.open(), wait * (0.8 + 0.4 * Math.random()));
@@ -67,7 +67,7 @@ export class Connection {
   }
 }
 
-/** A refused WebSocket does not say why; a plain request does. */
+/** A refused WebSocket has no reason; a plain request has. */
 async function refusesToken() {
   try {
     const answer = await fetch("/v1/status", { headers: authorization(), cache: "no-store" });

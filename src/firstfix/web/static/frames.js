@@ -1,4 +1,4 @@
-/** Binary frames of /v1/live: what the scan says, and the particles. */
+/** Binary frames of /v1/live: the scan and the particles. */
 
 const HEADER_BYTES = 16;
 const VERSION = 1;
@@ -10,7 +10,7 @@ const PARTICLES = 2;
  *
  * @param {ArrayBuffer} buffer
  * @returns {?{kind: "scan"|"particles", stamp: number, count: number,
- *     values: Float32Array, classes: ?Uint8Array}} null if it is of a kind this page does not know
+ *     values: Float32Array, classes: ?Uint8Array}} null if its kind is unknown
  */
 export function readFrame(buffer) {
   if (buffer.byteLength < HEADER_BYTES) return null;

@@ -1,9 +1,9 @@
-/** Pointers on the map: pan, wheel, pinch; in a mode, a press and a pull say place and heading. */
+/** Pointers on the map: pan, wheel, pinch; in a mode, press and drag set place and heading. */
 
-import { ghostAt } from "./layers/hypotheses.js";
+import { hypothesisAt } from "./layers/hypotheses.js";
 
-const SLOP_PX = 5; // a click may tremble so much
-const PULL_PX = 14; // a shorter pull gives no heading
+const SLOP_PX = 5; // a click may move this far
+const DRAG_PX = 14; // a shorter drag sets no heading
 const LONG_PRESS_MS = 550;
 const WHEEL_STEP = 0.0016;
 const LINE_PX = 16;
@@ -11,7 +11,7 @@ const LINE_PX = 16;
 export class Gestures {
   #pointers = new Map();
   #start = null; // where the first pointer came down
-  #pulled = false;
+  #moved = false;
   #drawing = false;
   #timer = 0;
 
@@ -19,7 +19,7 @@ export class Gestures {
    * @param {HTMLElement} surface
    * @param {View} view
    * @param {Scene} scene
-   * @param {object} on onViewed() after each move of the map by hand; onDraft(), onSet(), onPick(id), onNoPull(),
+   * @param {object} on onViewed() after each move of the map by hand; onDraft(), onSet(), onPick(id), onNoDrag(),
    *     onHover(x, y), onLongPress(): boolean
    */
   constructor(surface, view, scene, on) {
@@ -48,25 +48,25 @@ export class Gestures {
       return;
     }
     this.#start = at;
-    this.#pulled = false;
+    this.#moved = false;
     const aims = event.button === 0;
     if (aims && this.scene.mode !== "look") this.#begin(at);
     else if (aims) this.#timer = setTimeout(() => this.#press(at), LONG_PRESS_MS);
   }
 
   #press(at) {
-    if (this.#pulled || ghostAt(this.view, this.scene.ghosts, ...at) !== null) return;
+    if (this.#moved || hypothesisAt(this.view, this.scene.hypotheses, ...at) !== null) return;
     if (this.on.onLongPress()) this.#begin(at);
   }
 
   #begin([px, py]) {
     const [x, y] = this.view.toMap(px, py);
     this.#drawing = true;
-    this.scene.draft = { kind: this.scene.mode, x, y, yaw: this.#usualYaw() };
+    this.scene.draft = { kind: this.scene.mode, x, y, yaw: this.#defaultYaw() };
     this.on.onDraft();
   }
 
-  #usualYaw() {
+  #defaultYaw() {
     const state = this.scene.state;
     return (state?.pose ?? state?.truth)?.[2] ?? 0;
   }
@@ -84,7 +84,7 @@ export class Gestures {
   }
 
   #hover(at) {
-    const over = ghostAt(this.view, this.scene.ghosts, ...at);
+    const over = hypothesisAt(this.view, this.scene.hypotheses, ...at);
     this.on.onHover(this.view.toMap(...at), over);
   }
 
@@ -92,12 +92,12 @@ export class Gestures {
     const [dx, dy] = [at[0] - this.#start[0], at[1] - this.#start[1]];
     const distance = Math.hypot(dx, dy);
     if (distance > SLOP_PX) {
-      if (!this.#pulled && !this.#drawing) before = this.#start;
-      this.#pulled = true;
+      if (!this.#moved && !this.#drawing) before = this.#start;
+      this.#moved = true;
       clearTimeout(this.#timer);
     }
     if (this.#drawing) this.#pull(at, dx, dy, distance);
-    else if (this.#pulled) {
+    else if (this.#moved) {
       this.view.panBy(at[0] - before[0], at[1] - before[1]);
       this.on.onViewed();
     }
@@ -107,7 +107,7 @@ export class Gestures {
     const draft = this.scene.draft;
     if (!draft) return;
     if (draft.kind === "goal") [draft.x, draft.y] = this.view.toMap(...at);
-    else if (distance >= PULL_PX) draft.yaw = Math.atan2(-dy, dx);
+    else if (distance >= DRAG_PX) draft.yaw = Math.atan2(-dy, dx);
     this.on.onDraft();
   }
 
@@ -126,35 +126,35 @@ export class Gestures {
     clearTimeout(this.#timer);
     if (!known || !wasOnly) {
       [this.#start] = this.#pointers.values(); // the finger that stays goes on panning
-      this.#pulled = true;
+      this.#moved = true;
       return;
     }
     if (this.#drawing) this.#finish(this.#at(event));
-    else if (!this.#pulled && event.button === 0) this.#click(this.#at(event));
+    else if (!this.#moved && event.button === 0) this.#click(this.#at(event));
   }
 
   #finish(at) {
     const distance = Math.hypot(at[0] - this.#start[0], at[1] - this.#start[1]);
-    const needsPull = this.scene.draft?.kind === "pose";
+    const needsDrag = this.scene.draft?.kind === "pose";
     this.#drawing = false;
-    if (!needsPull || distance >= PULL_PX) {
+    if (!needsDrag || distance >= DRAG_PX) {
       this.on.onSet();
       return;
     }
     this.#drop();
-    const ghost = ghostAt(this.view, this.scene.ghosts, ...at);
-    if (ghost !== null) this.on.onPick(ghost);
-    else this.on.onNoPull();
+    const hypothesis = hypothesisAt(this.view, this.scene.hypotheses, ...at);
+    if (hypothesis !== null) this.on.onPick(hypothesis);
+    else this.on.onNoDrag();
   }
 
   #click(at) {
-    const ghost = ghostAt(this.view, this.scene.ghosts, ...at);
-    if (ghost !== null) this.on.onPick(ghost);
+    const hypothesis = hypothesisAt(this.view, this.scene.hypotheses, ...at);
+    if (hypothesis !== null) this.on.onPick(hypothesis);
   }
 
   #drop() {
     this.#drawing = false;
-    this.#pulled = true;
+    this.#moved = true;
     this.scene.draft = null;
     this.on.onDraft();
   }

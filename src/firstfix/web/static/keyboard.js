@@ -1,4 +1,4 @@
-/** All that the mouse can do, by keys. */
+/** Everything that the mouse does, with keys. */
 
 const PAN_PX = 70;
 const NUDGE_PX = 8;
@@ -19,10 +19,10 @@ export function listenToKeys(page) {
   });
 }
 
-/** Keys that a focused control uses itself: they press a button, and move a slider. */
+/** Keys that a focused control uses itself. */
 function belongsToControl({ key, target }) {
   if (target.matches("input[type=text], input[type=password]")) return true;
-  if (target.matches("input[type=range]")) return key in ARROWS;
+  if (target.matches("input[type=range], select")) return key in ARROWS;
   if (target.matches("#details, #events")) return key === "ArrowUp" || key === "ArrowDown";
   return target.matches("button, a") && (key === " " || key === "Enter");
 }

@@ -1,4 +1,4 @@
-/** The page: what comes from the robot goes to scene and panel, what a person does goes back. */
+/** The page: messages go to scene and panel, commands go back. */
 
 import { Actions } from "./actions.js";
 import { Camera } from "./camera.js";
@@ -10,16 +10,16 @@ import { Notices } from "./notices.js";
 import { Panel } from "./panel.js";
 import { Scene } from "./scene.js";
 import { Sheet } from "./sheet.js";
-import { Stage } from "./stage.js";
+import { Renderer } from "./renderer.js";
 import { Theme } from "./theme.js";
 import { Timeline } from "./timeline.js";
 import { authorization, keepToken, takeTokenFromFragment, token } from "./token.js";
 import { View } from "./view.js";
-import { metres } from "./words.js";
+import { metres } from "./format.js";
 
 const byId = (id) => document.getElementById(id);
 const app = byId("app");
-const redraw = () => stage.invalidate();
+const redraw = () => renderer.invalidate();
 
 takeTokenFromFragment();
 
@@ -29,8 +29,8 @@ const notices = new Notices();
 const timeline = new Timeline();
 const theme = new Theme();
 const camera = new Camera(view, scene, redraw);
-const stage = new Stage(view, scene, theme.colours, beforeFrame);
-const sheet = new Sheet(() => stage.resize(sheet.covered()));
+const renderer = new Renderer(view, scene, theme.colours, beforeFrame);
+const sheet = new Sheet(() => renderer.resize(sheet.covered()));
 const connection = new Connection({
   onMessage: take,
   onFrame(frame) {
@@ -46,23 +46,23 @@ const connection = new Connection({
 const actions = new Actions(connection, scene, view, notices, redraw);
 const panel = new Panel({
   onPick: (id) => actions.pick(id),
-  onMark: mark,
+  onHighlight: highlight,
   onNewState: (text) => notices.speak(text),
 });
 
-// ---- from the robot
+// ---- messages
 
 function take(message) {
   if (message.type === "hello") greet(message);
   else if (message.type === "state") takeState(message);
   else if (message.type === "event") timeline.add(message);
-  else if (message.type === "error") notices.complain(message.detail);
+  else if (message.type === "error") notices.showError(message.detail);
 }
 
 function greet(hello) {
   app.dataset.connected = "true";
   notices.hideLost();
-  scene.forgetRobot();
+  scene.clearRobot();
   timeline.replace(hello.events);
   actions.allow(hello.may_steer, hello.abilities);
   document.querySelector("[data-layer=truth]").hidden = hello.robot !== "sim";
@@ -83,20 +83,20 @@ async function showMap(map) {
   scene.map = map;
   scene.image = null;
   view.bounds = boundsOf(map);
-  stage.resize(sheet.covered());
+  renderer.resize(sheet.covered());
   camera.fit();
-  const image = await pictureOf(map).catch((problem) => {
-    notices.complain(`The picture of the map did not come: ${problem.message}.`);
+  const image = await imageOf(map).catch((problem) => {
+    notices.showError(`The image of the map could not be loaded: ${problem.message}.`);
     return null;
   });
-  if (scene.map !== map || !image) return; // another map came meanwhile
+  if (scene.map !== map || !image) return; // another map was received meanwhile
   scene.image = image;
-  stage.recolour();
+  renderer.recolour();
   app.dataset.map = map.name;
   performance.mark("map-shown");
 }
 
-async function pictureOf(map) {
+async function imageOf(map) {
   const answer = await fetch(map.image.url, { headers: authorization() });
   if (!answer.ok) throw new Error(`status ${answer.status}`);
   return createImageBitmap(await answer.blob());
@@ -105,37 +105,37 @@ async function pictureOf(map) {
 function askForToken() {
   app.dataset.connected = "false";
   byId("token-text").textContent =
-    token() ? "That was not the right one." : "Whoever started firstfix has it. This tab keeps it.";
+    token() ? "This token is wrong." : "The person who started firstfix has it. It is kept until this tab is closed.";
   keepToken(null);
   const dialog = byId("token-dialog");
   if (!dialog.open) dialog.showModal();
 }
 
-// ---- on the screen
+// ---- drawing
 
 function beforeFrame(now) {
   camera.frame(now);
   app.dataset.view = numbers([view.scale, view.x, view.y, ...view.middle]);
 }
 
-function mark(id) {
-  if (scene.marked === id) return;
-  scene.marked = id;
+function highlight(id) {
+  if (scene.highlighted === id) return;
+  scene.highlighted = id;
   redraw();
 }
 
-function hover(place, ghost = null) {
+function hover(place, hypothesis = null) {
   byId("cursor-text").textContent = place ? `${metres(place[0])}, ${metres(place[1])}` : "";
-  mark(ghost);
-  app.dataset.over = ghost !== null && actions.maySteer ? "ghost" : "";
+  highlight(hypothesis);
+  app.dataset.over = hypothesis !== null && actions.maySteer ? "hypothesis" : "";
 }
 
-/** For tests and for the curious: what is shown, readable from outside. */
+/** What is shown, readable from outside: for tests. */
 function numbers(values) {
   return values ? values.map((value) => value.toFixed(4)).join(" ") : "";
 }
 
-// ---- from the person
+// ---- input
 
 new Gestures(byId("overlay"), view, scene, {
   onViewed: () => camera.movedByHand(),
@@ -143,7 +143,7 @@ new Gestures(byId("overlay"), view, scene, {
   onDraft: redraw,
   onSet: () => actions.set(),
   onPick: (id) => actions.pick(id),
-  onNoPull: () => actions.needsPull(),
+  onNoDrag: () => actions.needsDrag(),
   onLongPress: () => actions.enterPoseMode(),
 });
 
@@ -167,7 +167,7 @@ listenToKeys({
   },
 });
 
-theme.onChange = () => stage.recolour();
+theme.onChange = () => renderer.recolour();
 byId("theme").addEventListener("click", () => theme.toggle());
 byId("help").addEventListener("click", () => byId("help-dialog").showModal());
 byId("retry").addEventListener("click", () => connection.open());
@@ -186,6 +186,6 @@ for (const chip of document.querySelectorAll("#show .chip")) {
   });
 }
 
-addEventListener("resize", () => stage.resize(sheet.covered()));
-stage.resize(sheet.covered());
+addEventListener("resize", () => renderer.resize(sheet.covered()));
+renderer.resize(sheet.covered());
 connection.open();

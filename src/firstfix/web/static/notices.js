@@ -1,12 +1,12 @@
-/** What must be said across the map, and what a screen reader says. */
+/** Notices over the map, and announcements of the screen reader. */
 
-const COMPLAINT_MS = 6000;
+const ERROR_MS = 6000;
 const SPEAK_EVERY_MS = 1200;
 
 const byId = (id) => document.getElementById(id);
 
 export class Notices {
-  #complaintTimer = 0;
+  #errorTimer = 0;
   #countdown = 0;
   #speakTimer = 0;
   #spoken = "";
@@ -20,26 +20,26 @@ export class Notices {
     this.speak(`${mode.text} ${mode.keys}`);
   }
 
-  /** Something that a person asked for cannot be done. */
-  complain(text) {
-    const box = byId("complaint");
+  /** A command that was refused, and why. */
+  showError(text) {
+    const box = byId("error-notice");
     box.textContent = text;
     box.hidden = false;
-    clearTimeout(this.#complaintTimer);
-    this.#complaintTimer = setTimeout(() => (box.hidden = true), COMPLAINT_MS);
+    clearTimeout(this.#errorTimer);
+    this.#errorTimer = setTimeout(() => (box.hidden = true), ERROR_MS);
   }
 
   showLost(waitMs) {
     clearInterval(this.#countdown);
     const until = performance.now() + waitMs;
-    const tell = () => {
+    const show = () => {
       const left = Math.max(Math.ceil((until - performance.now()) / 1000), 0);
       byId("connection-text").textContent =
-        left > 0 ? `No connection to the robot. Next try in ${left} s.` : "No connection. Trying …";
+        left > 0 ? `No connection to the robot. Retrying in ${left} s.` : "No connection to the robot. Retrying …";
     };
-    tell();
-    this.#countdown = setInterval(tell, 500);
-    if (byId("connection-lost").hidden) this.speak("The connection to the robot is lost.");
+    show();
+    this.#countdown = setInterval(show, 500);
+    if (byId("connection-lost").hidden) this.speak("Connection to the robot lost.");
     byId("connection-lost").hidden = false;
   }
 
@@ -49,7 +49,7 @@ export class Notices {
     byId("connection-lost").hidden = true;
   }
 
-  /** For screen readers: the newest only, and not too often. */
+  /** Announce to screen readers: the newest text only, at a limited rate. */
   speak(text) {
     this.#wanted = text;
     if (this.#speakTimer) return;

@@ -1,9 +1,9 @@
-/** The panel: state, why, evidence, places and figures. */
+/** The panel: state, reason, evidence, hypotheses and figures. */
 
-import * as words from "./words.js";
+import * as format from "./format.js";
 
 const EVERY_MS = 250; // figures that change faster cannot be read
-const SILENT_AFTER_MS = 3000;
+const STALE_AFTER_MS = 3000;
 const KINDS = ["explained", "short", "through_wall", "unknown"];
 
 const byId = (id) => document.getElementById(id);
@@ -16,14 +16,14 @@ export class Panel {
   #shownName = "";
   #state = null;
   #timer = 0;
-  #heardAt = 0;
+  #receivedAt = 0;
 
   /**
-   * @param {object} on onPick(id), onMark(id), onNewState(text for a screen reader)
+   * @param {object} on onPick(id), onHighlight(id), onNewState(text for a screen reader)
    */
   constructor(on) {
     this.on = on;
-    setInterval(() => this.#showSilence(), 1000);
+    setInterval(() => this.#showAge(), 1000);
   }
 
   showMap(map) {
@@ -33,11 +33,11 @@ export class Panel {
     document.title = `firstfix · ${map.name}`;
   }
 
-  /** Show a state: at once if it is another one, else with the next turn. */
+  /** Show a state: at once if it changed, else with the next update. */
   show(state) {
     this.#state = state;
-    this.#heardAt = performance.now();
-    if (state.state !== this.#shownName) this.#render();
+    this.#receivedAt = performance.now();
+    if (nameOf(state) !== this.#shownName) this.#render();
     else this.#timer ||= setTimeout(() => this.#render(), EVERY_MS);
   }
 
@@ -49,30 +49,33 @@ export class Panel {
     this.#showPlaces(state);
     this.#showEvidence(state.evidence);
     this.#showFigures(state);
-    this.#showSilence();
+    this.#showAge();
   }
 
   #showState(state) {
     const name = state.state;
-    const { word, icon, verdict } = words.wordsOfState(name);
+    const { icon, verdict } = state.chosen_by ? format.choiceTexts(state) : format.stateTexts(name);
     byId("app").dataset.state = name;
-    setText(byId("state-word"), word);
+    byId("app").dataset.chosen = String(Boolean(state.chosen_by));
+    setText(byId("state-word"), name);
     byId("state-icon").setAttribute("href", `#${icon}`);
     setText(byId("verdict"), verdict);
     setText(byId("reason"), sentence(state.reason));
-    const places = name === "DISAMBIGUATING" ? `${state.hypotheses.length} places` : "";
+    byId("reason").hidden = Boolean(state.chosen_by); // the verdict says it
+    const places = state.rivals > 1 ? `${state.rivals} places` : "";
     setText(byId("state-note"), places);
     byId("state-note").hidden = !places;
     byId("paused").hidden = !state.paused;
-    const advice = state.motion && name === "DISAMBIGUATING" ? words.motionText(state.motion) : "";
+    const advice = state.motion && name === "DISAMBIGUATING" ? format.motionText(state.motion) : "";
     setText(byId("advice"), advice);
     byId("advice").hidden = !advice;
-    setText(byId("pause-text"), state.paused ? "Go on" : "Pause");
+    setText(byId("pause-text"), state.paused ? "Resume" : "Pause");
     byId("pause").setAttribute("aria-pressed", String(Boolean(state.paused)));
     byId("pause-icon").setAttribute("href", state.paused ? "#i-play" : "#i-pause");
-    if (name === this.#shownName) return;
-    this.#shownName = name;
-    this.on.onNewState(`${word.toLowerCase()}. ${verdict} ${sentence(state.reason)}`);
+    if (nameOf(state) === this.#shownName) return;
+    this.#shownName = nameOf(state);
+    const spoken = name.toLowerCase().replaceAll("_", " ");
+    this.on.onNewState(`${spoken}. ${verdict} ${sentence(state.reason)}`);
   }
 
   #showPlaces(state) {
@@ -86,9 +89,9 @@ export class Panel {
       button.dataset.id = place.id;
       const [number, chance, where] = button.children;
       setText(number, String(i + 1));
-      setText(chance, words.percent(place.probability));
-      const fits = place.explained == null ? "" : `${words.percent(place.explained)} of the beams fit`;
-      setText(where.firstElementChild, words.poseText(place.pose));
+      setText(chance, format.percent(place.probability));
+      const fits = place.explained == null ? "" : `${format.percent(place.explained)} of the beams fit`;
+      setText(where.firstElementChild, format.poseText(place.pose));
       setText(where.lastElementChild, fits);
     });
   }
@@ -105,10 +108,10 @@ export class Panel {
     const id = () => Number(button.dataset.id);
     button.addEventListener("click", () => this.on.onPick(id()));
     for (const event of ["focus", "pointerenter"]) {
-      button.addEventListener(event, () => this.on.onMark(id()));
+      button.addEventListener(event, () => this.on.onHighlight(id()));
     }
     for (const event of ["blur", "pointerleave"]) {
-      button.addEventListener(event, () => this.on.onMark(null));
+      button.addEventListener(event, () => this.on.onHighlight(null));
     }
     item.append(button);
     return item;
@@ -116,41 +119,46 @@ export class Panel {
 
   #showEvidence(evidence) {
     setText(byId("beams"), evidence ? `${evidence.beams} beams` : "");
-    const said = [];
+    const parts = [];
     for (const kind of KINDS) {
       const css = kind.replace("_", "-");
       const share = evidence ? evidence[kind] : 0;
-      const text = evidence ? words.percent(share) : "–";
+      const text = evidence ? format.percent(share) : "–";
       const part = byId("evidence-bar").querySelector(`.${css}`);
       part.style.flexGrow = share;
       part.hidden = share === 0;
       const row = byId("legend").querySelector(`.${css}`);
       setText(row.querySelector("b"), text);
-      said.push(`${text} ${row.querySelector("span").textContent}`);
+      parts.push(`${text} ${row.querySelector("span").textContent}`);
     }
-    const label = evidence ? said.join(", ") : "No scan has been judged yet";
+    const label = evidence ? parts.join(", ") : "No scan yet";
     byId("evidence-bar").setAttribute("aria-label", label);
   }
 
   #showFigures(state) {
     const { pose, truth, covariance } = state;
-    setText(byId("pose"), pose ? words.poseText(pose) : "–");
+    setText(byId("pose"), pose ? format.poseText(pose) : "–");
     setText(byId("spread"), pose && covariance ? spreadText(covariance) : "–");
     byId("error-row").hidden = !truth;
     setText(byId("error"), pose && truth ? errorText(pose, truth) : "–");
     const fix = state.time_to_fix_s;
-    setText(byId("time-to-fix"), fix == null ? "–" : words.seconds(fix));
+    setText(byId("time-to-fix"), fix == null ? "–" : format.seconds(fix));
     setText(byId("cpu"), state.cpu_ms == null ? "–" : `${state.cpu_ms.toFixed(1)} ms`);
     setText(byId("particles"), state.particles ? state.particles.toLocaleString("en") : "–");
     setText(byId("viewers"), String(state.viewers ?? 1));
   }
 
-  #showSilence() {
-    const silent = performance.now() - this.#heardAt;
-    const tells = this.#state && !this.#state.paused && silent > SILENT_AFTER_MS;
-    byId("silence").hidden = !tells;
-    if (tells) setText(byId("silence"), `Nothing heard for ${Math.floor(silent / 1000)} s.`);
+  #showAge() {
+    const age = performance.now() - this.#receivedAt;
+    const isStale = this.#state && !this.#state.paused && age > STALE_AFTER_MS;
+    byId("stale").hidden = !isStale;
+    if (isStale) setText(byId("stale"), `Nothing received for ${Math.floor(age / 1000)} s.`);
   }
+}
+
+/** A new name makes the panel render at once. */
+function nameOf(state) {
+  return `${state.state} ${state.chosen_by ?? ""}`;
 }
 
 function child(tag, className) {
@@ -161,20 +169,20 @@ function child(tag, className) {
 
 function sentence(text) {
   if (!text) return "";
-  const words = text.replaceAll("_", " "); // wheel_drop is a name for programs
-  const first = words.charAt(0).toUpperCase() + words.slice(1);
+  const plain = text.replaceAll("_", " "); // such as wheel_drop
+  const first = plain.charAt(0).toUpperCase() + plain.slice(1);
   return /[.!?]$/.test(first) ? first : `${first}.`;
 }
 
 function spreadText([xx, , yy, yawYaw]) {
   const place = 2 * Math.sqrt(Math.max(xx, yy, 0));
-  const turn = 2 * words.degrees(Math.sqrt(Math.max(yawYaw, 0)));
-  return `± ${words.length(place)} · ± ${turn.toFixed(1)}°`;
+  const turn = 2 * format.degrees(Math.sqrt(Math.max(yawYaw, 0)));
+  return `± ${format.length(place)} · ± ${turn.toFixed(1)}°`;
 }
 
 function errorText(pose, truth) {
   const away = Math.hypot(pose[0] - truth[0], pose[1] - truth[1]);
   const turned = pose[2] - truth[2];
-  const angle = Math.abs(words.degrees(Math.atan2(Math.sin(turned), Math.cos(turned))));
-  return `${words.length(away)} · ${angle.toFixed(1)}°`;
+  const angle = Math.abs(format.degrees(Math.atan2(Math.sin(turned), Math.cos(turned))));
+  return `${format.length(away)} · ${angle.toFixed(1)}°`;
 }

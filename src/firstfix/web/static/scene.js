@@ -1,32 +1,32 @@
-/** What is known about the robot just now: everything that the layers draw. */
+/** Everything that the layers draw. */
 
 const TRAIL_STEP_M = 0.04;
 const TRAIL_POINTS = 3000;
-const JUMP_M = 0.6; // between two poses 50 ms apart: not driven
+const JUMP_M = 0.6; // between two poses 50 ms apart: not driven, so the trail is broken
 
 export class Scene {
   constructor() {
-    this.map = null; // as GET /v1/map says
+    this.map = null; // as GET /v1/map
     this.image = null; // ImageBitmap of the map
-    this.forgetRobot();
+    this.clearRobot();
     this.mode = "look";
-    this.draft = null; // {kind, x, y, yaw}: what a person is about to say
+    this.draft = null; // {kind, x, y, yaw}: the command that is being drawn
     this.goal = null; // [x, y] where the robot was last sent
-    this.marked = null; // id of the ghost under the pointer or the focus
+    this.highlighted = null; // id of the hypothesis under the pointer or the focus
     this.shown = { scan: true, particles: true, trail: true, truth: true };
   }
 
-  forgetRobot() {
+  clearRobot() {
     this.state = null;
     this.scan = null;
     this.particles = null;
     this.trail = [];
     this.goal = null;
-    this.marked = null;
+    this.highlighted = null;
   }
 
-  /** Several places, of which a person may choose one; none once the robot is found. */
-  get ghosts() {
+  /** The places of which a person may choose one; empty once the robot is localized. */
+  get hypotheses() {
     if (!this.state || this.state.state === "LOCALIZED") return [];
     return this.state.hypotheses;
   }
@@ -35,7 +35,7 @@ export class Scene {
     this.state = state;
     if (state.pose) this.#leaveTrail(state.pose);
     else this.#breakTrail();
-    if (!state.pose && !this.ghosts.length) this.scan = null;
+    if (!state.pose && !this.hypotheses.length) this.scan = null;
     if (!state.pose) this.particles = null;
     this.#arrive(state);
   }

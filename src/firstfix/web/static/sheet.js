@@ -40,7 +40,7 @@ export class Sheet {
       return { left: view.right, top: 0, right: innerWidth - box.left, bottom };
     }
     const state = document.getElementById("state").getBoundingClientRect();
-    // Words come and go; buttons that moved with them would be missed by a thumb.
+    // The head only grows with its texts, so that the buttons above it do not move.
     this.#headPx = Math.max(this.#headPx, state.bottom - box.top + 10);
     document.getElementById("app").style.setProperty("--sheet-head", `${this.#headPx}px`);
     const bottom = this.#headPx + (tools.hidden ? 0 : tools.offsetHeight + 8);

@@ -1,12 +1,12 @@
-/** Dark or light: as the system says, until somebody presses the button. */
+/** Dark or light: the setting of the system, until the button is pressed. */
 
-import { keep, recall } from "./memory.js";
+import { keep, recall } from "./storage.js";
 
 const KEY = "firstfix-theme";
 const BY_SYSTEM = "(prefers-color-scheme: dark)";
 const NAMES = [
   "ground", "free", "wall", "grid", "surface", "text", "muted", "robot", "robot-ink", "particle",
-  "trail", "truth", "ghost", "goal", "explained", "short", "through-wall", "unknown", "on-accent",
+  "trail", "truth", "chosen", "hypothesis", "goal", "explained", "short", "through-wall", "unknown", "on-accent",
 ];
 
 export class Theme {
@@ -18,7 +18,7 @@ export class Theme {
     this.onChange = () => {};
     this.colours = {}; // by name; the same object for good, its entries change
     this.#system.addEventListener("change", () => this.#apply());
-    // A style sheet that the system does not want is loaded last.
+    // A style sheet whose media query does not match is loaded last.
     this.#sheet.addEventListener("load", () => this.#apply());
     this.#apply();
   }
@@ -28,9 +28,9 @@ export class Theme {
   }
 
   toggle() {
-    const wanted = this.isDark ? "light" : "dark";
-    const asSystem = (wanted === "dark") === this.#system.matches;
-    this.#chosen = asSystem ? null : wanted;
+    const next = this.isDark ? "light" : "dark";
+    const asSystem = (next === "dark") === this.#system.matches;
+    this.#chosen = asSystem ? null : next;
     keep("localStorage", KEY, this.#chosen);
     this.#apply();
   }

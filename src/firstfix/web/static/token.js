@@ -1,6 +1,6 @@
-/** The token that a robot may ask for: kept for this tab, never in a URL that is sent or seen. */
+/** The access token: kept for this tab, never in a URL that is sent or shown. */
 
-import { keep, recall } from "./memory.js";
+import { keep, recall } from "./storage.js";
 
 const KEY = "firstfix-token";
 
@@ -14,7 +14,7 @@ export function takeTokenFromFragment() {
   history.replaceState(null, "", location.pathname + location.search);
 }
 
-/** @param {?string} text null to forget it */
+/** @param {?string} text null to delete it */
 export function keepToken(text) {
   known = text;
   keep("sessionStorage", KEY, text);

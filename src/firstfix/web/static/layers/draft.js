@@ -1,6 +1,6 @@
-/** What a person is about to say: a pose, a place to be carried to, a goal. */
+/** The command that is being drawn: a pose, a place to set the robot down, a goal. */
 
-import { heading, metres } from "../words.js";
+import { heading, metres } from "../format.js";
 import { drawArrowhead, robotRadius } from "./robot.js";
 
 const ARROW_PX = 58;
@@ -40,7 +40,7 @@ export function drawDraft(ctx, view, draft, colours) {
   drawTag(ctx, px, py + (below ? 1 : -1) * (radius + 22), text, colours);
 }
 
-/** Where the robot was sent. */
+/** The current goal. */
 export function drawGoal(ctx, view, goal, pose, colours) {
   const [px, py] = view.toScreen(goal[0], goal[1]);
   if (pose) {

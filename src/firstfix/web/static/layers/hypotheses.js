@@ -1,43 +1,43 @@
-/** Places where the robot may be: numbered ghosts, with how likely each is. */
+/** Hypotheses: numbered places where the robot may be, with their probabilities. */
 
-import { percent } from "../words.js";
+import { percent } from "../format.js";
 import { robotRadius } from "./robot.js";
 
 const LEAST_TARGET_PX = 24; // a finger must be able to hit it
 const FONT = "600 12px system-ui, sans-serif";
-const HOPELESS = 0.01; // below this a ghost is small and says no number, unless it is marked
+const UNLIKELY = 0.01; // below this probability a hypothesis is small and has no number, unless it is highlighted
 
-export function drawHypotheses(ctx, view, ghosts, marked, colours) {
+export function drawHypotheses(ctx, view, hypotheses, highlighted, colours) {
   // The most likely last, so that it lies on top.
-  for (let i = ghosts.length - 1; i >= 0; i--) {
-    drawGhost(ctx, view, ghosts[i], i, ghosts[i].id === marked, colours);
+  for (let i = hypotheses.length - 1; i >= 0; i--) {
+    drawHypothesis(ctx, view, hypotheses[i], i, hypotheses[i].id === highlighted, colours);
   }
 }
 
-function drawGhost(ctx, view, { pose, probability }, index, isMarked, colours) {
-  const isHopeless = probability < HOPELESS && !isMarked;
-  const radius = isHopeless ? 5 : Math.max(robotRadius(view), 11);
+function drawHypothesis(ctx, view, { pose, probability }, index, isHighlighted, colours) {
+  const isUnlikely = probability < UNLIKELY && !isHighlighted;
+  const radius = isUnlikely ? 5 : Math.max(robotRadius(view), 11);
   ctx.save();
   ctx.translate(...view.toScreen(pose[0], pose[1]));
-  ctx.strokeStyle = ctx.fillStyle = colours.ghost;
-  if (isHopeless) {
+  ctx.strokeStyle = ctx.fillStyle = colours.hypothesis;
+  if (isUnlikely) {
     ctx.globalAlpha = 0.55;
-    drawPointer(ctx, pose[2], radius, isMarked);
+    drawPointer(ctx, pose[2], radius, isHighlighted);
     ctx.restore();
     return;
   }
-  drawPointer(ctx, pose[2], radius, isMarked);
-  drawDisc(ctx, radius, isMarked, colours);
+  drawPointer(ctx, pose[2], radius, isHighlighted);
+  drawDisc(ctx, radius, isHighlighted, colours);
   ctx.font = FONT;
   ctx.textAlign = "center";
   ctx.textBaseline = "middle";
-  ctx.fillStyle = isMarked ? colours["on-accent"] : colours.ghost;
+  ctx.fillStyle = isHighlighted ? colours["on-accent"] : colours.hypothesis;
   ctx.fillText(String(index + 1), 0, 0.5);
   drawLabel(ctx, percent(probability), radius, pose[2], colours);
   ctx.restore();
 }
 
-function drawPointer(ctx, yaw, radius, isMarked) {
+function drawPointer(ctx, yaw, radius, isHighlighted) {
   ctx.save();
   ctx.rotate(-yaw);
   ctx.beginPath();
@@ -47,7 +47,7 @@ function drawPointer(ctx, yaw, radius, isMarked) {
   ctx.lineTo(radius - 1, -wide);
   ctx.closePath();
   ctx.fill();
-  if (isMarked) {
+  if (isHighlighted) {
     ctx.globalAlpha = 0.25;
     ctx.beginPath();
     ctx.arc(0, 0, radius + 14, 0, 2 * Math.PI);
@@ -56,20 +56,20 @@ function drawPointer(ctx, yaw, radius, isMarked) {
   ctx.restore();
 }
 
-function drawDisc(ctx, radius, isMarked, colours) {
+function drawDisc(ctx, radius, isHighlighted, colours) {
   ctx.beginPath();
   ctx.arc(0, 0, radius, 0, 2 * Math.PI);
-  ctx.fillStyle = isMarked ? colours.ghost : colours.surface;
-  ctx.globalAlpha = isMarked ? 1 : 0.88;
+  ctx.fillStyle = isHighlighted ? colours.hypothesis : colours.surface;
+  ctx.globalAlpha = isHighlighted ? 1 : 0.88;
   ctx.fill();
   ctx.globalAlpha = 1;
   ctx.lineWidth = 2;
-  ctx.setLineDash(isMarked ? [] : [4, 3]);
+  ctx.setLineDash(isHighlighted ? [] : [4, 3]);
   ctx.stroke();
   ctx.setLineDash([]);
 }
 
-/** The label goes behind the robot's back, where its pointer is not. */
+/** The label is behind the robot, where its pointer is not. */
 function drawLabel(ctx, text, radius, yaw, colours) {
   const below = Math.sin(yaw) > -0.2;
   const y = (below ? 1 : -1) * (radius + 13);
@@ -80,15 +80,15 @@ function drawLabel(ctx, text, radius, yaw, colours) {
   ctx.globalAlpha = 0.92;
   ctx.fill();
   ctx.globalAlpha = 1;
-  ctx.fillStyle = colours.ghost;
+  ctx.fillStyle = colours.hypothesis;
   ctx.fillText(text, 0, y);
 }
 
-/** The id of the ghost at a point of the window, or null. */
-export function ghostAt(view, ghosts, px, py) {
+/** The id of the hypothesis at a point of the window, or null. */
+export function hypothesisAt(view, hypotheses, px, py) {
   const reach = Math.max(robotRadius(view), LEAST_TARGET_PX);
   let [best, nearest] = [null, reach];
-  for (const { id, pose } of ghosts) {
+  for (const { id, pose } of hypotheses) {
     const [x, y] = view.toScreen(pose[0], pose[1]);
     const distance = Math.hypot(px - x, py - y);
     if (distance < nearest) [best, nearest] = [id, distance];

@@ -1,13 +1,13 @@
 /** The map, in the colours of the page, turned as its origin says. */
 
-// Of the picture that the server sends; what lies between was mixed when it was scaled.
+// Of the PNG of the server; values in between come from scaling.
 const WALL_GREY = 40;
 const UNKNOWN_GREY = 205;
 const FREE_GREY = 255;
 const CRISP_FROM = 1.5; // px of the window per px of the image: from here on cells have edges
 
 /**
- * Colour a grey map: walls, free space, and nothing where the map knows nothing.
+ * Colour a grey map: walls, free space, and transparent where the map is unknown.
  *
  * @returns {HTMLCanvasElement} the same size as the image
  */

@@ -1,4 +1,4 @@
-/** Particles: a tick each, from where it is to where it looks. */
+/** Particles: a tick each, in the direction of the heading. */
 
 const TICK_M = 0.12;
 const SHORTEST_PX = 2.5;

@@ -1,4 +1,4 @@
-/** The robot where it is believed to be, how sure that is, and where the simulation knows it is. */
+/** The robot at its pose with the uncertainty, and the true pose of a simulated robot. */
 
 const RADIUS_M = 0.18;
 const LEAST_RADIUS_PX = 9;
@@ -10,32 +10,33 @@ export function robotRadius(view) {
   return Math.max(RADIUS_M * view.scale, LEAST_RADIUS_PX);
 }
 
-export function drawRobot(ctx, view, pose, covariance, colours) {
+export function drawRobot(ctx, view, { pose, covariance, chosen_by: chosenBy }, colours) {
+  const colour = chosenBy ? colours.chosen : colours.robot;
   const [px, py] = view.toScreen(pose[0], pose[1]);
   const radius = robotRadius(view);
   ctx.save();
   ctx.translate(px, py);
-  if (covariance) drawHeadingSpread(ctx, view, pose[2], covariance[3], radius, colours);
+  if (covariance) drawHeadingSpread(ctx, view, pose[2], covariance[3], radius, colour);
   ctx.save();
   ctx.rotate(-pose[2]);
-  drawBody(ctx, radius, colours);
+  drawBody(ctx, radius, colour, colours["robot-ink"]);
   ctx.restore();
   if (covariance) drawEllipse(ctx, view, covariance, colours);
   ctx.restore();
 }
 
-function drawBody(ctx, radius, colours) {
+function drawBody(ctx, radius, colour, ink) {
   ctx.beginPath();
   ctx.arc(0, 0, radius, 0, 2 * Math.PI);
-  ctx.fillStyle = colours.robot;
+  ctx.fillStyle = colour;
   ctx.globalAlpha = radius > 24 ? 0.6 : 1; // close by, the particles stay visible below
   ctx.fill();
   ctx.globalAlpha = 1;
   ctx.lineWidth = Math.max(1.5, radius * 0.1);
-  ctx.strokeStyle = colours["robot-ink"];
+  ctx.strokeStyle = ink;
   ctx.stroke();
   drawArrowhead(ctx, radius * 0.62);
-  ctx.fillStyle = colours["robot-ink"];
+  ctx.fillStyle = ink;
   ctx.fill();
 }
 
@@ -67,14 +68,14 @@ function drawEllipse(ctx, view, [xx, xy, yy], colours) {
   ctx.stroke();
 }
 
-function drawHeadingSpread(ctx, view, yaw, variance, radius, colours) {
+function drawHeadingSpread(ctx, view, yaw, variance, radius, colour) {
   const half = Math.min(Math.max(SIGMAS * Math.sqrt(Math.max(variance, 0)), 0.01), Math.PI);
   const reach = Math.max(CONE_M * view.scale, LEAST_CONE_PX, 1.6 * radius);
   ctx.beginPath();
   ctx.moveTo(0, 0);
   ctx.arc(0, 0, reach, -yaw - half, -yaw + half);
   ctx.closePath();
-  ctx.fillStyle = ctx.strokeStyle = colours.robot;
+  ctx.fillStyle = ctx.strokeStyle = colour;
   ctx.lineWidth = 1.25;
   ctx.globalAlpha = 0.3;
   ctx.fill();
@@ -82,7 +83,7 @@ function drawHeadingSpread(ctx, view, yaw, variance, radius, colours) {
   ctx.globalAlpha = 1;
 }
 
-/** Where the simulated robot really stands: an outline only. */
+/** The true pose of the simulated robot: an outline only. */
 export function drawTruth(ctx, view, pose, colours) {
   const radius = robotRadius(view) + 3.5;
   ctx.save();

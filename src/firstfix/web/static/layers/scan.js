@@ -1,11 +1,11 @@
-/** The live scan: what each beam says about the pose, by colour and by shape. */
+/** The live scan: the class of each beam, by colour and by shape. */
 
 const EXPLAINED = 0;
 const SHORT = 1;
 const THROUGH_WALL = 2;
 const UNKNOWN = 3; // 4, a beam without return, has no end to draw
 
-// Dots first: what speaks against the pose must not hide under them.
+// Dots first: evidence against the pose must not hide under them.
 const ORDER = [UNKNOWN, EXPLAINED, SHORT, THROUGH_WALL];
 const COLOURS = ["explained", "short", "through-wall", "unknown"];
 
@@ -27,8 +27,8 @@ export function drawScan(ctx, view, scan, colours) {
   }
 }
 
-/** What the sensor can see, as one faint shape around the robot. */
-export function drawSight(ctx, view, scan, pose, colours) {
+/** The area that the sensor sees, as one faint shape around the robot. */
+export function drawFieldOfView(ctx, view, scan, pose, colours) {
   const { values, count } = scan;
   if (count < 3) return;
   ctx.beginPath();

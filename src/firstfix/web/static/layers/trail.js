@@ -1,4 +1,4 @@
-/** Where the robot came along; older parts are fainter. */
+/** The path of the robot; older parts are fainter. */
 
 const PARTS = 5;
 

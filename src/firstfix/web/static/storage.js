@@ -1,4 +1,4 @@
-/** What the browser keeps for the page; nothing, where it is told to keep nothing. */
+/** Browser storage; empty where the browser does not allow it. */
 
 /** @param {"localStorage"|"sessionStorage"} store */
 export function recall(store, key) {
@@ -9,12 +9,12 @@ export function recall(store, key) {
   }
 }
 
-/** Keep a text, or forget it where it is null. */
+/** Store a text; null removes it. */
 export function keep(store, key, text) {
   try {
     if (text === null) window[store].removeItem(key);
     else window[store].setItem(key, text);
   } catch {
-    // It is forgotten with the page then.
+    // Then it is lost when the page is closed.
   }
 }

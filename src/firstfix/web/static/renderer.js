@@ -1,4 +1,4 @@
-/** Two canvases, one for the map and one for what moves on it; drawn when something changed. */
+/** Two canvases, one for the map and one for what moves on it; drawn only after a change. */
 
 import { drawDraft, drawGoal } from "./layers/draft.js";
 import { drawGrid } from "./layers/grid.js";
@@ -6,15 +6,15 @@ import { drawHypotheses } from "./layers/hypotheses.js";
 import { colourMap, drawMap } from "./layers/map.js";
 import { drawParticles } from "./layers/particles.js";
 import { drawRobot, drawTruth } from "./layers/robot.js";
-import { drawScan, drawSight } from "./layers/scan.js";
+import { drawScan, drawFieldOfView } from "./layers/scan.js";
 import { drawTrail } from "./layers/trail.js";
 
-export class Stage {
+export class Renderer {
   #ground = document.getElementById("ground");
   #overlay = document.getElementById("overlay");
   #coloured = null; // the map in the colours of the theme
   #drawnVersion = -1;
-  #asked = false;
+  #requested = false;
   #changed = true;
 
   constructor(view, scene, colours, onFrame) {
@@ -32,23 +32,23 @@ export class Stage {
       canvas.width = wide;
       canvas.height = high;
     }
-    this.#frame(performance.now()); // a new size empties a canvas: the screen must not see that
+    this.#frame(performance.now()); // a new size clears a canvas, which must not be visible
   }
 
-  /** The colours or the map are new. */
+  /** The colours or the map changed. */
   recolour() {
     this.#coloured = this.scene.image ? colourMap(this.scene.image, this.colours) : null;
     this.#drawnVersion = -1;
     this.invalidate();
   }
 
-  /** Something on the map changed; it is drawn with the next frame of the screen. */
+  /** Something on the map changed; it is drawn in the next animation frame. */
   invalidate() {
     this.#changed = true;
-    if (this.#asked) return;
-    this.#asked = true;
+    if (this.#requested) return;
+    this.#requested = true;
     requestAnimationFrame((now) => {
-      this.#asked = false;
+      this.#requested = false;
       this.#frame(now);
     });
   }
@@ -73,17 +73,17 @@ export class Stage {
 
   #drawOverlay() {
     const { view, colours, scene } = this;
-    const { state, shown, ghosts } = scene;
+    const { state, shown, hypotheses } = scene;
     const ctx = cleared(this.#overlay, view);
     const pose = state?.pose ?? null;
-    if (shown.scan && scene.scan && pose) drawSight(ctx, view, scene.scan, pose, colours);
+    if (shown.scan && scene.scan && pose) drawFieldOfView(ctx, view, scene.scan, pose, colours);
     if (shown.trail && scene.trail.length) drawTrail(ctx, view, scene.trail, colours);
     if (shown.scan && scene.scan) drawScan(ctx, view, scene.scan, colours);
     if (shown.particles && scene.particles) drawParticles(ctx, view, scene.particles, colours);
     if (scene.goal) drawGoal(ctx, view, scene.goal, pose, colours);
     if (shown.truth && state?.truth) drawTruth(ctx, view, state.truth, colours);
-    if (pose) drawRobot(ctx, view, pose, state.covariance, colours);
-    if (ghosts.length) drawHypotheses(ctx, view, ghosts, scene.marked, colours);
+    if (pose) drawRobot(ctx, view, state, colours);
+    if (hypotheses.length) drawHypotheses(ctx, view, hypotheses, scene.highlighted, colours);
     if (scene.draft) drawDraft(ctx, view, scene.draft, colours);
   }
 }

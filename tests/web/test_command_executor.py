@@ -1,0 +1,106 @@
+"""Commands of viewers reach the localizer or the simulated robot, or are refused with a reason."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from live_lab import drive
+
+from firstfix.core.errors import InputError
+from firstfix.core.se2 import SE2
+from firstfix.localizer.inputs import Input, PoseHint, Reset
+from firstfix.localizer.outputs import Hypotheses
+from firstfix.localizer.states import State
+from firstfix.web.command_executor import CommandExecutor
+from firstfix.web.commands import (
+    Carry,
+    Command,
+    DriveTo,
+    Pause,
+    PickPlace,
+    Relocalize,
+    SetPeople,
+    SetPose,
+)
+
+
+class Recorder:
+    """A simulated robot that records what it is asked to do."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[Any, ...]] = []
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *arguments: self.calls.append((name, *arguments))
+
+
+@pytest.fixture
+def ambiguous():
+    """A robot in one of four equal rooms, after its first scan."""
+    begun = drive("rooms")
+    begun.step(21)
+    assert begun.store.snapshot.state is State.DISAMBIGUATING
+    return begun
+
+
+def test_hints_and_resets_have_the_time_of_the_snapshot(ambiguous):
+    given: list[Input] = []
+    executor = CommandExecutor(ambiguous.store, given.append)
+    executor.execute(SetPose(1.0, 2.0, 3.0))
+    executor.execute(Relocalize())
+    hint, reset = given
+    assert isinstance(hint, PoseHint)
+    assert isinstance(reset, Reset)
+    assert hint.T_map_base == SE2(1.0, 2.0, 3.0)
+    assert hint.stamp == reset.stamp == ambiguous.store.snapshot.stamp
+
+
+def test_a_new_ranking_between_display_and_click_picks_the_place_that_was_clicked(ambiguous):
+    begun = ambiguous
+    shown = begun.store.snapshot.hypotheses
+    clicked = shown[2]
+    places = (*shown[1:], shown[0])  # the list is ranked anew before the click arrives
+    begun.store(Reset(0.0), [Hypotheses(begun.store.snapshot.stamp, places)], begun.localizer)
+    assert begun.store.snapshot.hypotheses[2].id != clicked.id
+    CommandExecutor(begun.store, begun.give).execute(PickPlace(clicked.id))
+    begun.step(1)
+    snapshot = begun.store.snapshot
+    assert snapshot.state is State.LOCALIZED
+    assert snapshot.pose.distance_to(clicked.pose) < 0.3
+    assert (snapshot.chosen_by, snapshot.rivals) == ("a person", 4)
+
+
+def test_a_place_that_is_no_longer_listed_is_refused(ambiguous):
+    given: list[Input] = []
+    executor = CommandExecutor(ambiguous.store, given.append)
+    gone = 1 + max(place.id for place in ambiguous.store.snapshot.hypotheses)
+    with pytest.raises(InputError, match="no longer in the list"):
+        executor.execute(PickPlace(gone))
+    assert given == []
+
+
+@pytest.mark.parametrize(
+    ("command", "call"),
+    [
+        (Pause(True), ("pause",)),
+        (Pause(False), ("go_on",)),
+        (DriveTo(1.0, 2.0), ("drive_to", 1.0, 2.0)),
+        (Carry(1.0, 2.0, 3.0), ("carry_to", SE2(1.0, 2.0, 3.0))),
+        (SetPeople(4), ("meet", 4)),
+    ],
+)
+def test_commands_of_the_simulation(ambiguous, command: Command, call: tuple[Any, ...]):
+    robot = Recorder()
+    CommandExecutor(ambiguous.store, lambda _: None, robot).execute(command)
+    assert robot.calls == [call]
+    assert ambiguous.store.events()[-1].kind == "person"
+
+
+@pytest.mark.parametrize(
+    ("command", "remedy"),
+    [(DriveTo(1.0, 2.0), "Use your navigation stack"), (Pause(True), "simulated robot")],
+)
+def test_a_real_robot_is_not_controlled(ambiguous, command: Command, remedy: str):
+    with pytest.raises(InputError, match=remedy):
+        CommandExecutor(ambiguous.store, lambda _: None).execute(command)
