@@ -32,6 +32,7 @@ PACKAGES = (
     "starlette",
     "uvicorn",
     "websockets",
+    "msgspec",
 )
 EXTRAS = {
     "matplotlib": "missing, no pictures: pip install 'firstfix[plot]'",
@@ -146,21 +147,18 @@ def _kernels() -> tuple[str, bool]:
 
 
 def _tried_kernels() -> str:
-    import numpy as np
-
+    from firstfix.amcl.config import AmclConfig, SensorModel
     from firstfix.core.se2 import SE2
     from firstfix.fields.kernel_cache import kernel_folder
     from firstfix.global_localization.scan_matcher import ScanMatcher
-    from firstfix.lab.simulation.lidar import Lidar
-    from firstfix.lab.worlds.catalog import identical_rooms
+    from firstfix.localizer.precompile import precompile, scan_of, small_room
 
     start = time.perf_counter()
-    grid = identical_rooms(1)
-    scan = Lidar().scan(grid, SE2(2.0, 2.0, 0.5), np.random.default_rng(0))
-    matcher = ScanMatcher(grid, cache_dir=None)
-    matcher.locate(scan)
+    for model in SensorModel:
+        precompile(AmclConfig(laser_model_type=model))
     loaded = time.perf_counter() - start
-    result = matcher.locate(scan)
+    grid = small_room()
+    result = ScanMatcher(grid).locate(scan_of(grid, SE2(3.0, 2.5, 0.4)))
     return (
         f"ready after {loaded:.2f} s; then {result.elapsed_s:.3f} s a scan ({result.verdict.value})"
         f"; kept in {kernel_folder()}"
