@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.belief.planar import compose, inverse
 from firstfix.belief.view import Observation, motion
 from firstfix.core.angles import wrap
+from firstfix.fields.kernel_cache import kernel
 from firstfix.fields.map_fields import MapFields
 
 # What odometry leaves open between two views: a constant and a share of the way.
@@ -107,7 +107,7 @@ def strains(
     return 0.5 * (_FREEDOM + 1.0) * np.log1p(squared / _FREEDOM)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _descend(
     poses: NDArray[np.float64],
     ends_x: NDArray[np.float64],

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from firstfix.core.angles import FULL_TURN
+from firstfix.fields.kernel_cache import kernel
 from firstfix.global_localization.places import SAME_PLACE_M, SAME_PLACE_RAD
 
 
@@ -47,7 +47,7 @@ def merge(
     return _merge(poses, order, ids, known, SAME_PLACE_M / resolution, SAME_PLACE_RAD, most)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _merge(
     poses: NDArray[np.float64],
     order: NDArray[np.int64],
