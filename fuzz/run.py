@@ -1,8 +1,8 @@
 """Coverage-guided fuzzing of one reader, by atheris (libFuzzer).
 
-``python fuzz/run.py carmen -max_total_time=600``: what breaks the reader is written into the
-current folder as ``crash-...``; once mended, it belongs into ``fuzz/inputs/<target>/``, where a
-test tries it again.
+``python fuzz/run.py carmen -max_total_time=600``: an input that breaks the reader is
+written to the current folder as ``crash-...``. After the fix, move it to ``fuzz/inputs/<target>/``,
+where a test reads it again.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import atheris
 with atheris.instrument_imports(include=["firstfix"]):
     import firstfix.core.grid
     import firstfix.core.recording
-# Not the layers of kernels: instrumented, those do not compile.
+# Without the layers of kernels, which do not compile when instrumented.
 import firstfix.global_localization.scan_matcher
 import firstfix.localizer.localizer  # noqa: F401
 
@@ -25,7 +25,7 @@ with atheris.instrument_imports(include=["firstfix", "rosbags"]):
 
 
 def main() -> None:
-    """Fuzz the target that the first argument names; the others are libFuzzer's."""
+    """Fuzz the target of the first argument; the other arguments are libFuzzer's."""
     if len(sys.argv) < 2 or sys.argv[1] not in TARGETS:
         sys.exit(f"expected one of {', '.join(TARGETS)}")
     name = sys.argv.pop(1)

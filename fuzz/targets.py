@@ -1,7 +1,6 @@
-"""What is fuzzed: every reader, of files and of what comes over a network.
+"""Fuzz targets: every reader of files and of network messages.
 
-A target takes bytes that somebody else chose, and may raise nothing but errors of ours; `seeds`
-makes good ones.
+A target takes arbitrary bytes, and may raise only errors of firstfix. `seeds` makes valid inputs.
 """
 
 from __future__ import annotations
@@ -69,7 +68,7 @@ Target = Callable[[bytes, Path], None]
 
 
 def read_map_yaml(data: bytes, folder: Path) -> None:
-    """Read a YAML beside a good image."""
+    """Read a map YAML with a valid image."""
     (folder / "map.pgm").write_bytes(b"P5 3 2 255\n" + bytes([0, 205, 254, 0, 205, 254]))
     (folder / "map.yaml").write_bytes(data)
     load_map(folder / "map.yaml")
@@ -96,7 +95,7 @@ def _recording_of(kind: str) -> Target:
 
 
 def read_npz_member(data: bytes, folder: Path) -> None:
-    """Read an archive that is whole, with an array that is not: checksums stop raw mutations."""
+    """Read a valid archive with a damaged array: checksums stop raw mutations."""
     path = folder / "drive.npz"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("ranges.npy", data)
@@ -108,7 +107,7 @@ def read_npz_member(data: bytes, folder: Path) -> None:
 
 
 def read_bag_message(data: bytes, folder: Path) -> None:
-    """Read a bag that is whole, with a message that is not: SQLite refuses most raw mutations."""
+    """Read a valid bag with a damaged message: SQLite refuses most raw mutations."""
     with Writer2(folder / "drive", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
         store, kind = get_typestore(Stores.ROS2_HUMBLE), "sensor_msgs/msg/LaserScan"
         writer.write(writer.add_connection("/scan", kind, typestore=store), 10**9, data)
@@ -147,8 +146,8 @@ def read_node_argument(data: bytes, _: Path) -> None:
     settings_from(node="firstfix", amcl_file=None, files=[], assignments=[text], options={})
 
 
-def read_order(data: bytes, _: Path) -> None:
-    """Read what a viewer of the live page asks for."""
+def read_command(data: bytes, _: Path) -> None:
+    """Read a command of the live page."""
     decode(data, ClientMessage)
 
 
@@ -168,7 +167,7 @@ def _small_map() -> ActiveMap:
     return ActiveMap("small", "key", grid, ScanMatcher(grid))
 
 
-# What each type of message is made into; with DDS, its bytes come from whoever is in the network.
+# Converter of each message type; with DDS, any computer in the network can send the bytes.
 _CONVERSIONS: dict[str, Callable[[Any], object]] = {
     "sensor_msgs/LaserScan": lambda message: to_laser_scan(
         message, T_base_laser=SE2(0.0, 0.0, 0.0), mounting=Mounting.UPRIGHT
@@ -209,7 +208,7 @@ TARGETS: dict[str, Target] = {
     "tum": read_tum,
     "node_parameters": read_node_parameters,
     "node_argument": read_node_argument,
-    "order": read_order,
+    "command": read_command,
     "locate_json": _search_for(JSON),
     "locate_npz": _search_for(NPZ),
 }
@@ -218,15 +217,15 @@ if find_spec("cyclonedds"):
 
 
 def try_one(name: str, data: bytes) -> None:
-    """Give bytes to a target; anything that is not an error of ours goes through."""
+    """Run a target; only errors of firstfix are caught."""
     with tempfile.TemporaryDirectory(prefix="firstfix-fuzz-") as folder, suppress(FirstfixError):
         TARGETS[name](data, Path(folder))
 
 
 def seeds(name: str, folder: Path) -> Iterator[bytes]:
-    """Make good inputs of a target."""
-    if name in ("order", "locate_json", "locate_npz") or name.startswith(("cdr_", "node_")):
-        yield from _from_others(name)
+    """Make valid inputs of a target."""
+    if name in ("command", "locate_json", "locate_npz") or name.startswith(("cdr_", "node_")):
+        yield from _network_seeds(name)
     elif name == "map_yaml":
         yield _HEADER % b"pgm" + _THRESHOLDS
         yield _HEADER % b"pgm" + _THRESHOLDS + b"mode: scale\n"
@@ -257,8 +256,8 @@ def seeds(name: str, folder: Path) -> Iterator[bytes]:
         yield b"# t x y z qx qy qz qw\n1.0 2.0 3.0 0.0 0.0 0.0 0.0 1.0\n"
 
 
-def _from_others(name: str) -> Iterator[bytes]:
-    if name == "order":
+def _network_seeds(name: str) -> Iterator[bytes]:
+    if name == "command":
         yield b'{"type": "pose", "x": 1.5, "y": -2, "yaw": 0.1}'
         yield b'{"type": "people", "count": 5}'
     elif name == "locate_json":
@@ -284,7 +283,7 @@ def _from_others(name: str) -> Iterator[bytes]:
 
 
 def _good(store: Any, kind: str) -> Any:
-    """Make a message that says something: places are (1, 2, 0), lists have one element."""
+    """Make a message with values: positions are (1, 2, 0), lists have one element."""
     made = {}
     for field, (node, detail) in store.fielddefs[kind][1]:
         if node == Nodetype.NAME:

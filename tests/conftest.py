@@ -1,4 +1,4 @@
-"""What several test rooms share."""
+"""Fixtures that several packages of tests use."""
 
 import math
 import os
@@ -21,10 +21,10 @@ from firstfix.core.trajectory import Trajectory
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.drawing import Drawing
 
-# Of 100 that hypothesis likes to draw: a third of the time, and what they miss, others find later.
+# Hypothesis draws 100 by default; other runs draw other examples.
 CHECK_EXAMPLES = 30
 
-# Of packages that neither of the stores has.
+# Message types that are in neither store.
 DEFINITIONS = {
     "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms",
     "nav2_msgs/msg/Particle": "geometry_msgs/Pose pose\nfloat64 weight",
@@ -36,7 +36,7 @@ DEFINITIONS = {
 
 
 class Wire:
-    """Real messages of one ROS, and what is left of them at the other end."""
+    """Real messages of one ROS version, and what arrives at the receiver."""
 
     def __init__(self, store: Stores) -> None:
         self._store = get_typestore(store)
@@ -46,13 +46,13 @@ class Wire:
                 self._store.register(get_types_from_msg(definition, name))
 
     def make(self, type_name: str, /, **fields: Any) -> Any:
-        """Build a message of ``package/Type``, as transports do."""
+        """Build a message of ``package/Type``, as a transport does."""
         if self.is_ros1 and type_name == "std_msgs/Header":
             fields["seq"] = 0
         return self._store.types[type_name.replace("/", "/msg/")](**fields)
 
     def sent(self, message: Any) -> Any:
-        """Write a message to bytes, and read these."""
+        """Serialize and deserialize a message."""
         kind = message.__msgtype__
         if self.is_ros1:
             return self._store.deserialize_ros1(self._store.serialize_ros1(message, kind), kind)
@@ -74,12 +74,12 @@ def ros2() -> Wire:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Choose how many examples of a law hypothesis draws; none has a deadline: others may work too.
+    """Set how many examples hypothesis draws, without a deadline: the machine may be busy.
 
-    `make check` leaves out what is slow, and draws fewer than `make test`; other ones each time.
+    `make check` leaves out slow tests, and draws fewer examples than `make test`.
     """
     if not config.pluginmanager.hasplugin("hypothesispytest"):
-        return  # a Python of ROS, for the tests of the nodes alone
+        return  # the Python of ROS, which runs the tests of the nodes only
     from hypothesis import settings
 
     settings.register_profile("all", deadline=None)
@@ -90,7 +90,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture(scope="session")
 def shared() -> Path:
-    """Give the folder with recorded data that no checkout contains; skip where it is absent."""
+    """Give the folder with recorded data, which is not in the repository; skip if it is absent."""
     beside = Path(__file__).resolve().parents[1].parent / "shared"
     folder = Path(os.environ.get("FIRSTFIX_SHARED", beside))
     if not folder.is_dir():
@@ -100,7 +100,7 @@ def shared() -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Keep prepared maps of tests, and of the processes they start, out of the user's cache."""
+    """Keep cached maps of tests, and of the processes they start, out of the user's cache."""
     folder = tmp_path_factory.mktemp("firstfix-cache")
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("FIRSTFIX_CACHE_DIR", str(folder))
@@ -109,7 +109,7 @@ def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]
 
 @pytest.fixture
 def on_small_disk(tmp_path: Path) -> Callable[..., None]:
-    """Give a function that runs a program with a disk of 64 kB of its own, mounted at argv[1]."""
+    """Give a function that runs a program with a disk of 64 kB mounted at argv[1]."""
     alone, disk = ["unshare", "--map-root-user", "--mount"], tmp_path / "disk"
     mount = 'mount -t tmpfs -o size=64k tmpfs "$0"'
     disk.mkdir()
@@ -125,14 +125,14 @@ def on_small_disk(tmp_path: Path) -> Callable[..., None]:
         command: list[Any] = [*alone, "sh", "-c", then, disk, sys.executable, program]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
-        assert list(disk.iterdir()) == []  # nothing of it has reached the disk below
+        assert list(disk.iterdir()) == []  # nothing was written to the disk below
 
     return run
 
 
 @pytest.fixture
 def full_after() -> Callable[[int], Any]:
-    """Give a context in which no file of this process can grow beyond so many bytes."""
+    """Give a context that limits the size of every file of this process, in bytes."""
     resource = pytest.importorskip("resource")
 
     @contextmanager
@@ -149,7 +149,7 @@ def full_after() -> Callable[[int], Any]:
 
 @pytest.fixture(scope="session")
 def hall_plan() -> OccupancyGrid:
-    """9 x 7 m like no other place: a corner is cut off, and a block stands in the way."""
+    """A hall of 9 x 7 m without symmetry: a corner is cut off, and there is a block."""
     plan = Drawing(9.0, 7.0, 0.05, 0.5)
     plan.room(0.0, 0.0, 9.0, 7.0)
     plan.solid(0.1, 5.0, 2.0, 6.9)
@@ -161,7 +161,7 @@ def hall_plan() -> OccupancyGrid:
 def driven(hall_plan: OccupancyGrid) -> Recording:
     """A drive of 5.5 m through the hall, 0.1 m and 0.1 s from scan to scan, with a turn.
 
-    The odometry has a frame of its own, counts 3 % too far and turns 0.2° a scan too much.
+    The odometry has its own origin, measures 3 % too far and turns 0.2° a scan too much.
     """
     legs = [SE2(0.1, 0.0, 0.0)] * 30 + [SE2(0.0, 0.0, 0.15)] * 10 + [SE2(0.1, 0.0, 0.0)] * 25
     pose, counted = SE2(1.5, 1.5, 0.0), SE2(-3.0, 7.0, 2.0)

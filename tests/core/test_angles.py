@@ -1,4 +1,4 @@
-"""Angles: one interval, closed at the end REP 103 wants closed."""
+"""Angles: one interval, closed at +π as in REP 103."""
 
 import math
 
@@ -26,7 +26,7 @@ def test_half_a_turn_is_plus_pi_from_either_side(angle: float) -> None:
 
 
 @pytest.mark.parametrize("angle", [-math.pi + 1e-9, math.pi - 1e-9, 0.0])
-def test_wrap_leaves_what_is_inside_alone(angle: float) -> None:
+def test_wrap_keeps_an_angle_inside_the_interval(angle: float) -> None:
     assert wrap(angle) == pytest.approx(angle, abs=1e-15)
 
 
@@ -51,7 +51,7 @@ def test_angle_error_is_a_distance(a: float, b: float) -> None:
     assert angle_error(a, a + FULL_TURN) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_angle_error_across_the_seam_is_small() -> None:
+def test_angle_error_across_plus_minus_pi_is_small() -> None:
     assert angle_error(math.pi - 0.1, -math.pi + 0.1) == pytest.approx(0.2)
 
 

@@ -1,4 +1,4 @@
-"""Errors say what was expected, what came and what to do, also after a trip between processes."""
+"""Errors say what was expected, what was received and what to do, also after pickling."""
 
 import pickle
 

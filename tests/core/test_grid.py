@@ -1,4 +1,4 @@
-"""The occupancy grid: what it accepts, and where its cells lie."""
+"""The occupancy grid: accepted values, and the positions of its cells."""
 
 import math
 
@@ -74,18 +74,18 @@ def test_arrays_are_read_only(name: str) -> None:
         (np.full((2, 2), 101, np.int8), "to 101"),
     ],
 )
-def test_cells_that_no_map_has_are_refused(cells: NDArray[np.int8], expected: str) -> None:
+def test_invalid_cells_are_refused(cells: NDArray[np.int8], expected: str) -> None:
     with pytest.raises(MapError, match=expected):
         OccupancyGrid(cells, 0.05)
 
 
 @pytest.mark.parametrize("resolution", [0.0, -0.05, math.nan, math.inf])
-def test_a_resolution_that_no_map_has_is_refused(resolution: float) -> None:
+def test_an_invalid_resolution_is_refused(resolution: float) -> None:
     with pytest.raises(MapError, match="resolution above 0"):
         OccupancyGrid(CELLS, resolution)
 
 
-def test_a_map_that_would_fill_the_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_map_with_too_many_cells_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(grid_module, "MAX_CELLS", 8)
     with pytest.raises(MapError, match="at most 8 cells, received 3 x 3"):
         OccupancyGrid(CELLS, 0.05)

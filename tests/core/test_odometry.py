@@ -15,7 +15,7 @@ POSE = SE2(1.0, -2.0, 0.5)
 
 
 @pytest.mark.parametrize("stamp", [math.nan, math.inf, -math.inf])
-def test_a_time_that_is_none_is_refused(stamp: float) -> None:
+def test_a_stamp_that_is_not_finite_is_refused(stamp: float) -> None:
     for make in (
         lambda: Odometry(stamp, POSE),
         lambda: Signal(stamp, SignalKind.CLIFF, active=True),
@@ -25,12 +25,12 @@ def test_a_time_that_is_none_is_refused(stamp: float) -> None:
 
 
 @pytest.mark.parametrize("stamp", [0.0, -5.0, 1.7e9, 1e300])
-def test_any_finite_time_is_one(stamp: float) -> None:
+def test_any_finite_stamp_is_accepted(stamp: float) -> None:
     assert Odometry(stamp, POSE).stamp == stamp
     assert Signal(stamp, SignalKind.BUMPER, active=False).stamp == stamp
 
 
-def test_equal_messages_are_equal_and_none_can_be_changed() -> None:
+def test_messages_compare_by_value_and_are_frozen() -> None:
     odometry, signal = Odometry(1.0, POSE), Signal(1.0, SignalKind.CLIFF, active=True)
     assert odometry == Odometry(1.0, SE2(1.0, -2.0, 0.5))
     assert odometry != Odometry(1.0, SE2(1.0, -2.0, 0.6))
@@ -41,8 +41,7 @@ def test_equal_messages_are_equal_and_none_can_be_changed() -> None:
             value.stamp = 2.0
 
 
-def test_kinds_of_signals_are_found_by_their_words() -> None:
-    """Drivers and logs name them so."""
+def test_signal_kinds_have_the_names_of_drivers_and_logs() -> None:
     for word in ("cliff", "wheel_drop", "picked_up", "bumper"):
         assert SignalKind(word).value == word
     assert len(SignalKind) == 4

@@ -1,4 +1,4 @@
-"""A scan: what its numbers mean, and which numbers cannot be a scan."""
+"""A scan: the meaning of its numbers, and which numbers are refused."""
 
 import math
 from typing import Any
@@ -43,14 +43,14 @@ def test_every_beam_is_a_hit_or_no_return_or_invalid(ranges: list[float]) -> Non
 
 
 @pytest.mark.parametrize("reading", [math.nan, -math.inf, 0.0, -1.0, 0.1])
-def test_readings_that_are_none_take_no_part(reading: float) -> None:
+def test_invalid_readings_are_ignored(reading: float) -> None:
     scan = make([reading])
     assert not scan.hit.any()
     assert not scan.no_return.any()
 
 
 @pytest.mark.parametrize("reading", [math.inf, 10.0, 11.0, 1e39])
-def test_at_the_limit_or_beyond_means_open_space(reading: float) -> None:
+def test_readings_at_range_max_or_beyond_mean_open_space(reading: float) -> None:
     scan = make(np.array([reading]))
     assert scan.no_return.all()
     assert not scan.hit.any()
@@ -60,7 +60,7 @@ def test_zero_is_no_hit_even_where_range_min_is_zero() -> None:
     assert not make([0.0], range_min=0.0).hit.any()
 
 
-def test_a_sensor_without_a_limit_may_say_so() -> None:
+def test_range_max_may_be_infinite() -> None:
     scan = make([5.0, math.inf], range_max=math.inf)
     assert scan.hit.tolist() == [True, False]
     assert scan.no_return.tolist() == [False, True]
@@ -101,7 +101,7 @@ def test_one_beam_needs_no_increment() -> None:
     "ranges",
     [[], [[1.0, 2.0]], 1.0, ["near", "far"], [1.0 + 2.0j], [None], np.zeros(MAX_BEAMS + 1)],
 )
-def test_ranges_that_no_scan_has_are_refused(ranges: Any) -> None:
+def test_invalid_ranges_are_refused(ranges: Any) -> None:
     with pytest.raises(ScanError, match="ranges"):
         make(ranges, angle_increment=1e-6)
 
@@ -121,7 +121,7 @@ def test_ranges_that_no_scan_has_are_refused(ranges: Any) -> None:
         ({"stamp": math.nan}, "stamp"),
     ],
 )
-def test_limits_that_no_sensor_has_are_refused(changes: dict[str, float], expected: str) -> None:
+def test_invalid_limits_are_refused(changes: dict[str, float], expected: str) -> None:
     with pytest.raises(ScanError, match=expected):
         make(**changes)
 

@@ -1,4 +1,4 @@
-"""SE(2) is a group, and points move with it."""
+"""SE(2) is a group, and acts on points."""
 
 import math
 
@@ -69,7 +69,7 @@ def test_yaw_is_stored_in_the_half_open_interval() -> None:
 
 
 @given(poses)
-def test_three_numbers_there_and_back(T: SE2) -> None:
+def test_arrays_convert_both_ways(T: SE2) -> None:
     assert SE2.from_array(T.as_array()) == T
 
 
@@ -84,7 +84,7 @@ def test_rotation_jacobian_turns_small_steps(T: SE2, dx: float, dy: float, dyaw:
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", [0, 1, 2])
-def test_a_pose_of_numbers_that_are_none_is_refused(bad: float, place: int) -> None:
+def test_a_pose_with_nan_or_infinity_is_refused(bad: float, place: int) -> None:
     numbers = [0.0, 0.0, 0.0]
     numbers[place] = bad
     with pytest.raises(InputError, match="finite"):

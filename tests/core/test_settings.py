@@ -1,4 +1,4 @@
-"""Settings: one declaration, checked types and ranges, and errors that say what to write."""
+"""Settings: one declaration, checked types and ranges, and errors with a remedy."""
 
 import math
 from dataclasses import FrozenInstanceError, dataclass, field, fields
@@ -38,19 +38,19 @@ def test_defaults_are_as_declared():
     assert Lamp() == Lamp(5.0, 2, False, Colour.RED, "lamp", "", 0.0, SE2.identity())
 
 
-def test_a_setting_knows_its_meaning_and_range():
+def test_a_setting_has_a_description_and_a_range():
     power = fields(Lamp)[0].metadata
     assert (power["description"], power["least"], power["most"]) == ("light, W", 0.0, 100.0)
     free = fields(Lamp)[6].metadata
     assert (free["least"], free["most"]) == (-math.inf, math.inf)
 
 
-def test_settings_stay_as_they_are():
+def test_settings_are_frozen():
     with pytest.raises(FrozenInstanceError):
         Lamp().power = 3.0
 
 
-def test_a_whole_number_for_a_number_becomes_one():
+def test_a_whole_number_becomes_a_float():
     lamp = Lamp(power=7)
     assert lamp.power == 7.0
     assert type(lamp.power) is float
@@ -59,7 +59,7 @@ def test_a_whole_number_for_a_number_becomes_one():
 @pytest.mark.parametrize(
     "good", [{"power": 0.0}, {"power": 100.0}, {"count": 1}, {"count": 2**53}, {"shift": -1e9}]
 )
-def test_both_ends_of_a_range_belong_to_it(good):
+def test_both_ends_of_a_range_are_accepted(good):
     lamp = Lamp(**good)
     assert all(getattr(lamp, name) == value for name, value in good.items())
 
@@ -90,20 +90,20 @@ def test_both_ends_of_a_range_belong_to_it(good):
         ({"place": (0.0, 0.0)}, "metres and radians"),
     ],
 )
-def test_what_does_not_fit_is_told_with_the_remedy(bad, words):
+def test_invalid_values_are_refused_with_a_remedy(bad, words):
     with pytest.raises(InputError, match=words):
         Lamp(**bad)
 
 
-def test_an_empty_text_is_one_where_the_default_is():
+def test_an_empty_text_is_accepted_if_the_default_is_empty():
     assert Lamp(note="").note == ""
 
 
-def test_what_was_not_declared_as_a_setting_is_not_checked():
+def test_fields_that_are_no_settings_are_not_checked():
     assert Lamp(unchecked=[1]).unchecked == [1]
 
 
-def test_a_long_value_does_not_fill_the_screen():
+def test_a_long_value_is_shortened_in_the_message():
     with pytest.raises(InputError) as caught:
         Lamp(power="x" * 10_000)
     assert len(str(caught.value)) < 300
@@ -121,7 +121,7 @@ ANYTHING = (
 
 
 @given(st.sampled_from([entry.name for entry in fields(Lamp)][:-1]), ANYTHING)
-def test_a_setting_has_the_type_of_its_default_or_there_are_none(name, value):
+def test_a_setting_has_the_type_of_its_default_or_is_refused(name, value):
     try:
         lamp = Lamp(**{name: value})
     except InputError:

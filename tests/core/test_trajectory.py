@@ -1,4 +1,4 @@
-"""A path over time: exact at its stamps, in between on the shorter way, silent outside."""
+"""Poses over time: exact at the stamps, interpolated between them, unknown outside."""
 
 import math
 
@@ -39,15 +39,15 @@ def test_every_time_between_first_and_last_has_a_pose_between(stamp: float) -> N
 
 
 @pytest.mark.parametrize("stamp", [0.999, 4.001, -math.inf, math.inf])
-def test_outside_is_not_known(stamp: float) -> None:
+def test_outside_of_the_stamps_there_is_no_pose(stamp: float) -> None:
     assert PATH.at(stamp) is None
 
 
-def test_no_pose_at_all_is_a_path_that_knows_nothing() -> None:
+def test_an_empty_trajectory_has_no_pose() -> None:
     assert Trajectory(np.empty(0), np.empty((0, 3))).at(0.0) is None
 
 
-def test_two_poses_at_one_time_are_accepted() -> None:
+def test_two_poses_at_one_stamp_are_accepted() -> None:
     twice = Trajectory(np.array([0.0, 1.0, 1.0, 2.0]), np.zeros((4, 3)))
     assert twice.at(1.0) == SE2.identity()
     assert twice.at(1.5) == SE2.identity()
@@ -73,6 +73,8 @@ def test_arrays_are_copies_and_read_only() -> None:
         ([0.0, 2.0, 1.0], np.zeros((3, 3)), "step back at pose 2"),
     ],
 )
-def test_what_is_no_path_is_refused(stamps: list[float], poses: np.ndarray, expected: str) -> None:
+def test_invalid_trajectories_are_refused(
+    stamps: list[float], poses: np.ndarray, expected: str
+) -> None:
     with pytest.raises(InputError, match=expected):
         Trajectory(np.array(stamps), poses)

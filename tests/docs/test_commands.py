@@ -1,4 +1,4 @@
-"""Commands, options, targets and scripts that pages name are there."""
+"""Commands, options, make targets and scripts that the pages name exist."""
 
 import re
 import shlex
@@ -11,7 +11,7 @@ from firstfix.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")])
-# What stands alone on a line of code, or between backticks.
+# An indented line of code, or text between backticks.
 CODE = re.compile(r"^ {4,}(\S.*)$|`([^`]+)`", re.MULTILINE)
 COMMAND = re.compile(r"^(?:\S*/)?firstfix ([a-z].*)")
 TARGET = re.compile(r"(?:^|\s)make ([a-z][a-z-]*)")
@@ -19,7 +19,7 @@ SCRIPT = re.compile(r"\b(?:benchmarks|fuzz|docs|\.ci)/[\w/-]+\.py\b")
 
 
 def code_of(page: Path) -> list[str]:
-    """Return all code of a page, in lines."""
+    """Return all lines of code of a page."""
     text = re.sub(
         r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE
     )
@@ -27,7 +27,7 @@ def code_of(page: Path) -> list[str]:
 
 
 def check_command(line: str) -> None:
-    """Walk from the program to the command, and look every option up."""
+    """Check that a command and all its options exist."""
     command = get_command(app)
     words = shlex.split(line.replace("...", ""))
     while words and hasattr(command, "commands"):
@@ -41,14 +41,14 @@ def check_command(line: str) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_commands_are_there(page: Path) -> None:
+def test_commands_exist(page: Path) -> None:
     for code in code_of(page):
         for found in COMMAND.findall(code):
             check_command(found)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_targets_and_scripts_are_there(page: Path) -> None:
+def test_targets_and_scripts_exist(page: Path) -> None:
     targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
     for code in code_of(page):
         assert set(TARGET.findall(code)) <= set(targets), code
@@ -59,6 +59,6 @@ def test_targets_and_scripts_are_there(page: Path) -> None:
 @pytest.mark.parametrize(
     "line", ["lokate map.yaml", "locate map.yaml scan.npz --plott x.png", "map chek map.yaml"]
 )
-def test_what_is_not_there_is_noticed(line: str) -> None:
+def test_an_unknown_command_or_option_fails(line: str) -> None:
     with pytest.raises(AssertionError, match=r"no (command|option)"):
         check_command(line)

@@ -1,4 +1,4 @@
-"""The site builds without a warning, and shows what pages mean."""
+"""The site builds without warnings, and renders the pages correctly."""
 
 import importlib.util
 import os
@@ -14,8 +14,8 @@ from firstfix.localizer.states import TABLE
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-# Paragraphs in which a list, a table or a block of code was not seen as one: a line is missing
-# before it, or the indent is not four spaces.
+# Paragraphs with a list, a table or a block of code that was not rendered: a blank line before it
+# is missing, or the indent is not four spaces.
 RUN_TOGETHER = re.compile(r"<p>(?:(?!</p>).)*\n(?:- |\* |\d+\. |\||```)", re.DOTALL)
 
 
@@ -48,20 +48,20 @@ def test_every_public_name_has_its_entry(site: Path) -> None:
 
 
 @pytest.mark.slow
-def test_lists_and_tables_are_seen_as_such(site: Path) -> None:
+def test_lists_and_tables_are_rendered(site: Path) -> None:
     for page in site.rglob("*.html"):
         found = RUN_TOGETHER.search(page.read_text(encoding="utf-8"))
         assert found is None, f"{page.relative_to(site)}: {found[0][-200:] if found else ''}"
 
 
 @pytest.mark.slow
-def test_what_pages_link_to_outside_docs_is_there(site: Path) -> None:
+def test_pages_outside_of_docs_are_on_the_site(site: Path) -> None:
     assert (site / "CONTRIBUTING.html").exists()
     assert list((site / "benchmarks" / "reports").rglob("*.png"))
 
 
 @pytest.mark.slow
-def test_nothing_is_loaded_from_elsewhere(site: Path) -> None:
+def test_nothing_is_loaded_from_other_sites(site: Path) -> None:
     for page in site.rglob("*.html"):
         text = page.read_text(encoding="utf-8")
         assert not re.search(r'(?:src|<link[^>]*href)="(?:https?:)?//', text), page

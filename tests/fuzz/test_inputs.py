@@ -1,4 +1,4 @@
-"""Inputs that once broke a reader, and good ones: nothing but errors of ours may come."""
+"""Inputs that broke a reader once, and valid ones, raise only errors of firstfix."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ spec.loader.exec_module(targets)
 FOUND = sorted(path for path in (FUZZ / "inputs").glob("*/*") if path.is_file())
 
 
-def test_what_once_broke_a_reader_does_not_any_more():
+def test_inputs_that_broke_a_reader_once_are_refused():
     for path in FOUND:
         targets.try_one(path.parent.name, path.read_bytes())
 
 
 @pytest.mark.parametrize("name", targets.TARGETS)
-def test_seeds_are_good_inputs(name, tmp_path):
+def test_seeds_are_valid_inputs(name, tmp_path):
     work = tmp_path / "work"
     work.mkdir()
     found = list(targets.seeds(name, tmp_path))

@@ -79,10 +79,10 @@ def locate(
                 typer.echo(f"{f'scan {i}: ' if every else ''}{_as_text(result, truth)}")
             done(result.verdict.value)
     if plot is not None:
-        from firstfix.plots.answer_picture import draw_answer
+        from firstfix.plots.result_picture import draw_result
 
         typer.echo(
-            f"picture: {draw_answer(grid, recording.scans[i], result, plot, truth)}", err=True
+            f"picture: {draw_result(grid, recording.scans[i], result, plot, truth)}", err=True
         )
     if not every and result.verdict is not Verdict.UNIQUE:
         raise typer.Exit(NO_ANSWER)

@@ -1,1 +1,1 @@
-"""What things are: value types and geometry, on NumPy alone."""
+"""Value types and geometry, on NumPy alone."""

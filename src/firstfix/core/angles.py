@@ -28,12 +28,12 @@ def wrap(angle: float | NDArray[np.float64]) -> float | NDArray[np.float64]:
     float or ndarray
         The same direction in (-π, π]; an array stays an array.
     """
-    # Turning the interval round moves its closed end to +π, where REP 103 wants it. A tiny negative
-    # remainder rounds up to a full turn and would leave exactly -π.
+    # The mirrored interval is closed at +π, as in REP 103. A tiny negative remainder rounds up to a
+    # full turn and would leave exactly -π.
     if isinstance(angle, np.ndarray):
         turned = math.pi - np.remainder(math.pi - angle.astype(np.float64), FULL_TURN)
         return np.where(turned <= -math.pi, math.pi, turned)
-    # Every SE2 passes here: plain numbers are a tenth of the time.
+    # Every SE2 is wrapped; with plain numbers this takes a tenth of the time.
     turn = math.pi - (math.pi - float(angle)) % FULL_TURN
     return math.pi if turn <= -math.pi else turn
 
@@ -55,7 +55,7 @@ def angle_error(
     Returns
     -------
     float or ndarray
-        The shorter way from one to the other, rad, in [0, π].
+        The smaller angle between them, rad, in [0, π].
     """
     error = np.abs(wrap(np.asarray(a, np.float64) - np.asarray(b, np.float64)))
     return error if isinstance(a, np.ndarray) or isinstance(b, np.ndarray) else float(error)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 
 class FirstfixError(Exception):
-    """Root of every error that firstfix raises on purpose.
+    """Base class of all errors that firstfix raises for bad input.
 
     Examples
     --------
@@ -33,9 +33,9 @@ class InputError(FirstfixError):
         What is wrong and what to do, in plain sentences. Without it the text is made of the other
         three, which suit malformed data.
     expected : str
-        What would have been right.
+        What is required.
     received : str
-        What came instead.
+        What was passed.
     remedy : str
         What the user can do.
 
@@ -56,7 +56,7 @@ class InputError(FirstfixError):
         super().__init__(message or f"expected {expected}, received {received}; {remedy}")
 
     def __reduce__(self) -> tuple[object, ...]:
-        # Worker processes of `bench` send errors home; keyword-only arguments need help to pickle.
+        # Worker processes send errors to their parent; keyword-only arguments do not pickle.
         return _rebuild, (type(self), str(self), self.expected, self.received, self.remedy)
 
 
@@ -73,7 +73,7 @@ class MapError(InputError):
 
 
 class ScanError(InputError):
-    """A scan, or a log of scans, that cannot be used.
+    """A scan or a log that cannot be used.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Answers: where the robot may be, how likely, and why."""
+"""Results of global localization: places, probabilities and evidence."""
 
 from __future__ import annotations
 
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 class Verdict(Enum):
     """How far a result can be trusted.
 
+    UNIQUE: one place fits, and no other nearly as well. AMBIGUOUS: several places fit, or the
+    evidence is too weak. NO_MATCH: no place explains the scan.
+
     Examples
     --------
     >>> ff.ScanMatcher(grid).locate(scan).verdict is ff.Verdict.UNIQUE
@@ -40,18 +43,18 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """How the beams of a scan agree with the map at one pose; shares of all used beams, 0 to 1.
+    """How the beams of a scan agree with the map at one pose: shares of the used beams, 0 to 1.
 
     Parameters
     ----------
     explained : float
-        Beams that end where the map has a wall (or meet nothing where it has none).
+        Beams that end at a wall of the map, or return nothing where the map has none.
     short : float
-        Beams that end before the wall: people, furniture; weak evidence against the pose.
+        Beams that end before the wall (people, furniture): weak evidence against the pose.
     through_wall : float
-        Beams that saw through a wall; strong evidence against the pose.
+        Beams that pass through a wall: strong evidence against the pose.
     unknown : float
-        Beams that end where the map knows nothing.
+        Beams that end in unknown space or outside the map.
     beams : int
         Number of beams used.
 
@@ -71,21 +74,21 @@ class Evidence:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Hypothesis:
-    """One place where the robot may be.
+    """One possible place of the robot.
 
     Parameters
     ----------
     pose : SE2
         ``T_map_base``.
     covariance : ndarray, shape (3, 3)
-        Of x (m), y (m), yaw (rad) in the map frame, given that this is the right place.
+        Of x (m), y (m), yaw (rad) in the map frame, if this is the right place.
     score : float
         Mean cost of a beam; lower is better. Comparable within one result only.
     probability : float
-        That this is the right place, 0 to 1; what is missing to 1 over all hypotheses is the
-        probability of a place that is not listed.
+        That this is the right place, 0 to 1. The rest to 1 over all hypotheses is the probability
+        of the places that are not listed.
     evidence : Evidence
-        How the beams agree with the map here.
+        How the beams agree with the map at this pose.
     id : int or None
         Number that a localizer gives to the place and keeps as long as the place is listed; None
         in the answer to a single scan.
@@ -131,12 +134,12 @@ class Hypothesis:
 
 @dataclass(frozen=True, slots=True)
 class SearchReport:
-    """What the search did.
+    """Extent of a search.
 
     Parameters
     ----------
     poses : int
-        Number of poses the search decided on.
+        Number of poses of the search grid.
     searched : float
         Share of them that was scored, 0 to 1; less than 1 only with a small ``max_poses``.
     proven : bool
@@ -162,9 +165,9 @@ class LocateResult:
     verdict : Verdict
         Whether the best hypothesis may be published.
     reason : str
-        The verdict in words, for a person.
+        The verdict in words.
     hypotheses : tuple of Hypothesis
-        Separated places, most likely first; empty where the scan says nothing.
+        Separate places, most likely first; empty if the scan has too few hits.
     search : SearchReport
         What was searched, and whether its optimum is proven.
     elapsed_s : float
@@ -260,7 +263,7 @@ class LocateResult:
             If matplotlib is not installed, the file cannot be written, or the result does not come
             from `ScanMatcher.locate`.
         """
-        from firstfix.plots import answer_picture, figure
+        from firstfix.plots import figure, result_picture
 
         if self.grid is None or self.scan is None:
             raise InputError(
@@ -268,7 +271,7 @@ class LocateResult:
                 received="a result without them",
                 remedy="plot a result of ScanMatcher.locate",
             )
-        drawn = answer_picture.answer_figure(self.grid, self.scan, self, truth)
+        drawn = result_picture.result_figure(self.grid, self.scan, self, truth)
         if path is not None:
             figure.save_figure(drawn, Path(path))
         return drawn

@@ -1,4 +1,4 @@
-"""The occupancy grid: what is wall, what is free, what nobody has seen."""
+"""The occupancy grid: occupied, free and unknown cells."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ UNKNOWN = -1
 FREE = 0
 OCCUPIED = 100
 
-# SLAM systems publish probabilities in between; these are the thresholds of map_server
-# (occupied_thresh 0.65, free_thresh 0.25) in per cent.
+# Thresholds of map_server in per cent (occupied_thresh 0.65, free_thresh 0.25), for the
+# probabilities that SLAM systems publish.
 OCCUPIED_FROM = 65
 FREE_UP_TO = 25
 
-# A float32 distance field of this many cells is 2 GB: larger maps are a mistake or an attack.
+# A float32 distance field of this many cells takes 2 GB: larger maps are an error or an attack.
 MAX_CELLS = 500_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class OccupancyGrid:
-    """A map of square cells, as ``nav_msgs/OccupancyGrid`` means it.
+    """A map of square cells, with the values of ``nav_msgs/OccupancyGrid``.
 
     Parameters
     ----------
@@ -37,15 +37,18 @@ class OccupancyGrid:
     resolution : float
         Side of a cell, m.
     T_map_grid : SE2
-        Pose of the lower-left *corner* of cell (0, 0) in the map frame, yaw included.
+        Pose of the lower-left *corner* of cell (0, 0) in the map frame. A tuple (x, y, yaw) in
+        metres and radians is accepted.
     unseen : ndarray of bool, shape (height, width), or None
-        Free cells that nobody has ever seen, where the file tells them apart: map savers write grey
-        205 for unknown, which the ``free_thresh: 0.25`` of others reads as free. Made read-only.
+        Free cells that were never observed, where the file distinguishes them: map savers write
+        grey 205 for unknown, which ``free_thresh: 0.25`` reads as free. Made read-only.
 
     Raises
     ------
     MapError
-        If the shape, a value or the resolution cannot belong to a map.
+        If the shape, a value or the resolution is not that of a map.
+    InputError
+        If ``T_map_grid`` is not a pose.
 
     Examples
     --------
@@ -67,7 +70,7 @@ class OccupancyGrid:
             raise MapError(
                 expected="a map of at least one row and one column",
                 received=f"cells of shape {cells.shape}",
-                remedy="check the image or message the map came from",
+                remedy="check the source image or message",
             )
         if cells.size > MAX_CELLS:
             raise MapError(
@@ -114,22 +117,22 @@ class OccupancyGrid:
 
     @cached_property
     def occupied(self) -> NDArray[np.bool_]:
-        """Where a wall is, shape (height, width)."""
+        """Occupied cells, shape (height, width)."""
         return _read_only(self.cells >= OCCUPIED_FROM)
 
     @cached_property
     def free(self) -> NDArray[np.bool_]:
-        """Where there is no wall, by the thresholds, shape (height, width)."""
+        """Free cells by the thresholds, shape (height, width)."""
         return _read_only((self.cells >= FREE) & (self.cells <= FREE_UP_TO))
 
     @cached_property
     def seen_free(self) -> NDArray[np.bool_]:
-        """Where a robot can be: free, and not unseen, shape (height, width)."""
+        """Free cells without the unseen ones, shape (height, width): where a robot can be."""
         return self.free if self.unseen is None else _read_only(self.free & ~self.unseen)
 
     @cached_property
     def unknown(self) -> NDArray[np.bool_]:
-        """Where nobody has seen anything, shape (height, width)."""
+        """Unknown and unseen cells, shape (height, width)."""
         unknown = self.cells == UNKNOWN
         return _read_only(unknown if self.unseen is None else unknown | self.unseen)
 
@@ -147,11 +150,11 @@ class OccupancyGrid:
 
     @property
     def free_area(self) -> float:
-        """Area of all cells where a robot can be, m²."""
+        """Area of the cells in `seen_free`, m²."""
         return float(np.count_nonzero(self.seen_free)) * self.resolution**2
 
     def to_cells(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Take points of the map frame to continuous cell coordinates.
+        """Convert points of the map frame to continuous cell coordinates.
 
         Parameters
         ----------
@@ -166,7 +169,7 @@ class OccupancyGrid:
         return self.T_map_grid.inverse().apply(points) / self.resolution
 
     def to_map(self, cells: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Take continuous cell coordinates (column, row), shape (..., 2), to the map frame, m."""
+        """Convert cell coordinates (column, row), shape (..., 2), to points of the map frame, m."""
         return self.T_map_grid.apply(cells * self.resolution)
 
 

@@ -1,4 +1,4 @@
-"""What a robot reports besides scans: how its wheels turned, and that something happened to it."""
+"""Inputs from the base: wheel odometry, and the signals of its safety sensors."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from firstfix.core.se2 import SE2
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """Where the wheels say that the robot is.
+    """A pose from wheel odometry.
 
     Parameters
     ----------
     stamp : float
         Time, s.
     T_odom_base : SE2
-        Pose of the base in the odometry frame: smooth, and adrift.
+        Pose of the base in the odometry frame: continuous, but it drifts. A tuple (x, y, yaw) in
+        metres and radians is accepted.
 
     Raises
     ------
@@ -42,7 +43,7 @@ class Odometry:
 
 
 class SignalKind(Enum):
-    """What sensors of the base can tell; the values are Kobuki's words.
+    """Safety sensors of a base; the values are the names of the Kobuki driver.
 
     Examples
     --------
@@ -57,27 +58,27 @@ class SignalKind(Enum):
 
     @property
     def means_lifted(self) -> bool:
-        """True for what a robot senses that does not stand on its wheels."""
+        """True for the sensors that are active while the robot is off the floor."""
         return self is not SignalKind.BUMPER
 
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """A sensor of the base that begins or ceases to report.
+    """A safety sensor of the base that becomes active or inactive.
 
     Parameters
     ----------
     stamp : float
         Time, s.
-    kind : SignalKind
-        Which sensor.
+    kind : SignalKind or str
+        The sensor.
     active : bool
-        True from when a wheel drops, a bumper is pressed...; False from when that is over.
+        True when the wheel drops or the bumper is pressed; False when that is over.
 
     Raises
     ------
     InputError
-        If the stamp is not finite.
+        If the stamp is not finite, or no sensor has this name.
 
     Examples
     --------
@@ -100,5 +101,5 @@ def _check_stamp(stamp: float) -> None:
         raise InputError(
             expected="a finite stamp in seconds",
             received=f"stamp {stamp}",
-            remedy="look for NaN or infinity where the time comes from",
+            remedy="check the source of the time",
         )

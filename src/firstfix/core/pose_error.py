@@ -10,14 +10,14 @@ from firstfix.core.se2 import SE2
 
 @dataclass(frozen=True, slots=True)
 class PoseError:
-    """Distance of a pose from the truth.
+    """Distance of a pose from the ground truth.
 
     Parameters
     ----------
     metres : float
-        Of position, m; inf where there is no pose.
+        Position error, m; inf without a pose.
     radians : float
-        Of heading, rad, never negative; inf where there is no pose.
+        Heading error, rad, at least 0; inf without a pose.
     """
 
     metres: float
@@ -25,9 +25,9 @@ class PoseError:
 
     @classmethod
     def between(cls, pose: SE2, truth: SE2) -> PoseError:
-        """Measure the error of a pose against the truth."""
+        """Return the error of a pose."""
         return cls(pose.distance_to(truth), angle_error(pose.yaw, truth.yaw))
 
     def is_within(self, tolerance: PoseError) -> bool:
-        """Tell whether both parts are below those of a tolerance."""
+        """Return whether position and heading error are both below a tolerance."""
         return self.metres < tolerance.metres and self.radians < tolerance.radians

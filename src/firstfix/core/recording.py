@@ -19,25 +19,27 @@ from firstfix.core.trajectory import Trajectory
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Scans in the order of their stamps, whatever file they came from.
+    """The scans of a log in the order of their stamps, with odometry and ground truth if known.
 
     Parameters
     ----------
     scans : tuple of LaserScan
         At least one.
     odometry : Trajectory or None
-        ``T_odom_base`` over time, where the log has it.
+        ``T_odom_base`` over time, if the log has it.
     truth : ndarray, shape (n_scans, 3), or None
-        ``T_map_base`` at each scan: x (m), y (m), yaw (rad); NaN rows where it is not known.
+        ``T_map_base`` at each scan: x (m), y (m), yaw (rad); NaN rows where unknown.
     runs : ndarray of int, shape (n_scans,), or None
-        Scans with one number belong to one uninterrupted drive.
+        Number of the uninterrupted drive that each scan belongs to.
     notes : tuple of str
-        What the reader had to assume or leave out, in words, for a person.
+        Assumptions of the reader, and what it left out, in words.
 
     Raises
     ------
     ScanError
-        If there is no scan, or truth or runs do not fit the scans.
+        If there is no scan, or the shape of truth or runs does not match the scans.
+    InputError
+        If a scan is not a LaserScan.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""One sweep of a 2D LIDAR."""
+"""One scan of a 2D LIDAR."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAX_BEAMS = 100_000
 
 
 class Mounting(Enum):
-    """Which way up the sensor sits on the robot.
+    """Which way up the sensor is mounted.
 
     Examples
     --------
@@ -33,7 +33,7 @@ class Mounting(Enum):
 
 @dataclass(frozen=True, eq=False)
 class LaserScan:
-    """A scan as ``sensor_msgs/LaserScan`` means it, with the sensor's place on the robot.
+    """A scan with the meaning of ``sensor_msgs/LaserScan``, and the pose of the sensor.
 
     Parameters
     ----------
@@ -49,14 +49,16 @@ class LaserScan:
     stamp : float
         Time of the scan, s.
     T_base_laser : SE2
-        Pose of the sensor on the robot.
-    mounting : Mounting
+        Pose of the sensor on the robot. A tuple (x, y, yaw) in metres and radians is accepted.
+    mounting : Mounting or str
         ``UPSIDE_DOWN`` mirrors the bearings.
 
     Raises
     ------
     ScanError
-        If these numbers cannot describe a scan. Legal scans that say nothing are accepted.
+        If the numbers are not those of a scan. A valid scan without hits is accepted.
+    InputError
+        If ``T_base_laser`` is not a pose, or ``mounting`` has another name.
 
     Examples
     --------
@@ -121,7 +123,7 @@ class LaserScan:
             math.isfinite(self.stamp),
             "a finite stamp in seconds",
             f"stamp {self.stamp}",
-            "use 0 where the time is not known",
+            "use 0 if the time is unknown",
         )
         object.__setattr__(self, "ranges", ranges)
         object.__setattr__(self, "T_base_laser", as_pose(self.T_base_laser, "T_base_laser"))
@@ -137,7 +139,7 @@ class LaserScan:
 
     @cached_property
     def bearings(self) -> NDArray[np.float64]:
-        """Bearing of every beam seen from above in the upright sensor frame, shape (n,), rad."""
+        """Bearing of each beam, seen from above, in the upright sensor frame, shape (n,), rad."""
         bearings = self.angle_min + self.angle_increment * np.arange(
             len(self.ranges), dtype=np.float64
         )
@@ -152,7 +154,7 @@ class LaserScan:
 
     @cached_property
     def no_return(self) -> NDArray[np.bool_]:
-        """Beams that met nothing within range, shape (n,): evidence of open space."""
+        """Beams without an obstacle within range, shape (n,): evidence of open space."""
         with np.errstate(invalid="ignore", over="ignore"):
             return (self.ranges >= self.range_max) & (self.ranges > 0.0)
 
@@ -171,7 +173,7 @@ def _as_ranges(ranges: ArrayLike) -> NDArray[np.float32]:
         f"{array.dtype} of shape {array.shape}",
         "pass one scan at a time, as numbers",
     )
-    with np.errstate(over="ignore"):  # what float32 cannot hold is infinitely far
+    with np.errstate(over="ignore"):  # beyond float32 is infinitely far
         array = array.astype(np.float32)
     array.flags.writeable = False
     return array

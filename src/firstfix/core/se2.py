@@ -1,4 +1,4 @@
-"""Rigid motions of the plane."""
+"""Rigid transforms of the plane."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NORM_ERROR = 0.1
 
 @dataclass(frozen=True, slots=True)
 class SE2:
-    """A pose, or the transform it stands for: ``T_a_b`` takes coordinates of b into a.
+    """A pose, or the equal transform: ``T_a_b`` converts coordinates of frame b to frame a.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class SE2:
             raise InputError(
                 expected="a pose of finite numbers x, y, yaw",
                 received=f"({self.x}, {self.y}, {self.yaw})",
-                remedy="look for NaN or infinity where the pose comes from",
+                remedy="check the source of the pose",
             )
         object.__setattr__(self, "x", float(self.x))
         object.__setattr__(self, "y", float(self.y))
@@ -57,18 +57,18 @@ class SE2:
 
     @classmethod
     def identity(cls) -> SE2:
-        """Return the transform that changes nothing."""
+        """Return the identity transform."""
         return cls(0.0, 0.0, 0.0)
 
     @classmethod
     def from_array(cls, pose: ArrayLike) -> SE2:
-        """Read a pose from its three numbers x (m), y (m), yaw (rad)."""
+        """Return the pose of an array x (m), y (m), yaw (rad), shape (3,)."""
         x, y, yaw = np.asarray(pose, np.float64).tolist()
         return cls(x, y, yaw)
 
     @classmethod
     def from_quaternion(cls, x: float, y: float, quaternion: Sequence[float]) -> SE2:
-        """Read a pose whose heading is a quaternion, as in ``geometry_msgs/Pose``.
+        """Return the pose of a position and a quaternion, as in ``geometry_msgs/Pose``.
 
         Parameters
         ----------
@@ -123,7 +123,7 @@ class SE2:
         return np.array([self.x, self.y, self.yaw])
 
     def __matmul__(self, other: SE2) -> SE2:
-        """Chain transforms: ``T_a_c = T_a_b @ T_b_c``."""
+        """Compose transforms: ``T_a_c = T_a_b @ T_b_c``."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return SE2(
             self.x + c * other.x - s * other.y,
@@ -132,12 +132,12 @@ class SE2:
         )
 
     def inverse(self) -> SE2:
-        """Return the transform of the opposite direction: ``T_b_a`` of ``T_a_b``."""
+        """Return the inverse: ``T_b_a`` of ``T_a_b``."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return SE2(-c * self.x - s * self.y, s * self.x - c * self.y, -self.yaw)
 
     def apply(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Take points of frame b into frame a.
+        """Convert points of frame b to frame a.
 
         Parameters
         ----------
@@ -155,7 +155,7 @@ class SE2:
         return moved
 
     def rotation_jacobian(self) -> NDArray[np.float64]:
-        """Return the matrix, shape (3, 3), that turns (dx, dy, dyaw) of frame b into frame a."""
+        """Return the matrix, shape (3, 3), that rotates (dx, dy, dyaw) from frame b to frame a."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 

@@ -1,4 +1,4 @@
-"""Settings: dataclass fields that know what they mean and how far they may go."""
+"""Settings: dataclass fields with a description and a range."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from firstfix.core.arguments import as_member, as_pose
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 
-# Beyond this a whole number has no float of its own, and no setting has a meaning.
+# Beyond this, floats do not represent all whole numbers.
 _WHOLE_LIMIT = 2.0**53
 
 
@@ -21,11 +21,11 @@ def setting(default: Any, text: str, least: float = -math.inf, most: float = mat
     Parameters
     ----------
     default : bool, int, float, str, Enum or another frozen value
-        The default; its type is that of the setting.
+        The default. The setting has the same type.
     text : str
-        What it means, with its unit.
+        Description, with the unit.
     least, most : float
-        The range of a number, both ends included.
+        Range of a number, both ends included.
 
     Returns
     -------
@@ -37,12 +37,14 @@ def setting(default: Any, text: str, least: float = -math.inf, most: float = mat
 
 
 def check_settings(config: Any) -> None:
-    """Check all fields of a dataclass that has just been made; whole numbers become floats.
+    """Check the settings of a dataclass in its ``__post_init__``, and convert their types.
+
+    Whole numbers become floats, strings become enum members, and three numbers become poses.
 
     Parameters
     ----------
     config : dataclass
-        One whose fields were declared by `setting`.
+        Fields that `setting` declared are checked, others are not.
 
     Raises
     ------
@@ -57,7 +59,7 @@ def check_settings(config: Any) -> None:
 
 
 def _checked(name: str, value: object, default: object, metadata: dict[str, Any]) -> object:
-    """Return a setting in the type of its default; raise InputError if it does not fit."""
+    """Return a value in the type of the default; raise InputError if it has another or no range."""
     least, most = metadata["least"], metadata["most"]
     if isinstance(default, float) and type(value) is int and abs(value) < _WHOLE_LIMIT:
         value = float(value)
@@ -67,7 +69,7 @@ def _checked(name: str, value: object, default: object, metadata: dict[str, Any]
         return as_pose(value, name)
     fits = type(value) is type(default) and (value != "" or default == "")
     if fits and isinstance(value, (int, float)):
-        # Not for NaN, not for infinity.
+        # False for NaN and infinity.
         fits = bool(max(least, -_WHOLE_LIMIT) <= value <= min(most, _WHOLE_LIMIT))
     if fits:
         return value

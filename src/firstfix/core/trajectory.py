@@ -1,4 +1,4 @@
-"""The path that wheels, or a ground truth, report over time."""
+"""Poses over time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from firstfix.core.se2 import SE2
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Poses over time, such as odometry (``T_odom_base``) or the truth (``T_map_base``).
+    """Poses over time, such as odometry (``T_odom_base``) or ground truth (``T_map_base``).
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class Trajectory:
     Raises
     ------
     InputError
-        If the lengths differ, a number is not finite or the stamps go back.
+        If the lengths differ, a number is not finite, or the stamps are not ascending.
 
     Examples
     --------
@@ -51,7 +51,7 @@ class Trajectory:
             raise InputError(
                 expected="finite stamps and poses",
                 received="NaN or infinity among them",
-                remedy="drop the poses that are not known",
+                remedy="remove the unknown poses",
             )
         steps_back = stamps[1:] < stamps[:-1]
         if steps_back.any():
@@ -82,7 +82,7 @@ class Trajectory:
         Returns
         -------
         SE2 or None
-            The pose; None before the first or after the last stamp (not yet known).
+            The pose; None before the first and after the last stamp.
         """
         i = int(np.searchsorted(self.stamps, stamp))
         if i < len(self.stamps) and self.stamps[i] == stamp:

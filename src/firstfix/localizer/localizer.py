@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from firstfix.amcl.particles import Particles
+from firstfix.core.arguments import as_instance
 from firstfix.core.estimate import Evidence, Hypothesis, LocateResult, Verdict
 from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.scan import LaserScan
@@ -21,7 +22,7 @@ from firstfix.localizer.agreement import AgreementCounter, is_new_view
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.contest import Contest, Standing
 from firstfix.localizer.deciding_motion import FARTHEST_M, deciding_motion
-from firstfix.localizer.inputs import Input, NewMap, NoMotionUpdate, PoseHint, Reset
+from firstfix.localizer.inputs import Input, NewMap, NoMotionUpdate, PoseHint, Reset, check_input
 from firstfix.localizer.outputs import Hypotheses, InitialPose, Output, Status
 from firstfix.localizer.pose_monitor import Fit
 from firstfix.localizer.pose_tracker import PoseTracker, Tracked
@@ -68,7 +69,7 @@ class Localizer:
     def __init__(
         self, config: LocalizerConfig | None = None, cache_dir: Path | None = None
     ) -> None:
-        self.config = config or LocalizerConfig()
+        self.config = as_instance(LocalizerConfig, config or LocalizerConfig(), "config")
         self._state = State.NO_MAP
         self._cache_dir = cache_dir
         self._rng = np.random.default_rng(self.config.amcl.seed)
@@ -123,9 +124,12 @@ class Localizer:
 
         Raises
         ------
+        InputError
+            If the value is not an input.
         MapError
             If a new map cannot be searched. The state stays as it was.
         """
+        check_input(given)
         if isinstance(given, NewMap):
             return self._take_map(given)
         if isinstance(given, Odometry):

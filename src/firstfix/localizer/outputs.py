@@ -102,6 +102,12 @@ class MotionRequest:
         Then drive, m; 0 to turn only.
     gain : float
         Entropy over the places that the view from there is expected to remove, nats.
+
+    Examples
+    --------
+    >>> request = ff.MotionRequest(stamp=0.1, turn=1.57, ahead=0.5, gain=0.3)
+    >>> f"turn {request.turn} rad, then drive {request.ahead} m"
+    'turn 1.57 rad, then drive 0.5 m'
     """
 
     stamp: float

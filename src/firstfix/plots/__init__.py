@@ -1,1 +1,1 @@
-"""Pictures of answers and maps."""
+"""Pictures of results and maps."""

@@ -1,4 +1,4 @@
-"""Figures into files, without a window; the only place that names matplotlib at run time."""
+"""Figures in files, without a window, and their common style."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ if TYPE_CHECKING:
     from PIL import Image
 
 _DOTS_PER_INCH = 120
-_COLOURS = 128  # a dozen, and their blends where edges are smoothed
-_ALIKE = 8  # of 255: two colours that nobody tells apart
+_COLOURS = 128  # a dozen, and their blends at smoothed edges
+_SAME_COLOUR = 8  # of 255: the eye sees no difference
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
-# Okabe & Ito (2008): told apart by people who are colour-blind, and in grey.
+# Okabe & Ito (2008): distinct for colour-blind readers, and in grey.
 BLUE, ORANGE, GREEN = "#0072B2", "#E69F00", "#009E73"
 RED, PURPLE, SKY = "#D55E00", "#CC79A7", "#56B4E9"
 PALETTE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY)
-# Once all colours are taken, they come again in another dash.
+# After the last colour, the next dash begins.
 _DASHES = ("-", "--", "-.", ":")
 
 
 def check_path(path: Path) -> None:
-    """Refuse a name that no figure can be saved under, before any work is done for it.
+    """Check the path of a picture before the work for it begins.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def check_path(path: Path) -> None:
 
 
 def line_style(number: int) -> dict[str, Any]:
-    """Return colour and dash of the line of a number from 0, as keywords of matplotlib."""
+    """Return colour and dash of line ``number``, from 0, as keywords of matplotlib."""
     return {
         "color": PALETTE[number % len(PALETTE)],
         "ls": _DASHES[number // len(PALETTE) % len(_DASHES)],
@@ -64,12 +64,12 @@ def line_style(number: int) -> dict[str, Any]:
 def share_curve(
     values: Sequence[float], least: float, most: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return which share of some values is at most so large, as the corners of a step curve.
+    """Return the cumulative share of values as the corners of a step curve.
 
     Parameters
     ----------
     values : sequence of float
-        At least one; inf where there is none, so that the curve stays below 1.
+        At least one. An unknown value is inf, so that the curve stays below 1.
     least, most : float
         Ends of the axis.
 
@@ -86,11 +86,11 @@ def share_curve(
 
 
 def number_plainly(axis: Axis) -> None:
-    """Put plain numbers on a logarithmic axis, between the decades too if there are few."""
+    """Write plain numbers on a logarithmic axis; with few decades, between them too."""
     from matplotlib.ticker import LogFormatter
 
     class Plain(LogFormatter):
-        """Numbers where matplotlib wants one, but 0.1 instead of 1e-01."""
+        """The numbers of matplotlib, written as 0.1 instead of 1e-01."""
 
         def __call__(self, x: float, pos: int | None = None) -> str:
             return f"{x:g}" if super().__call__(x, pos) else ""
@@ -100,9 +100,9 @@ def number_plainly(axis: Axis) -> None:
 
 
 def can_draw() -> bool:
-    """Tell whether matplotlib is installed."""
+    """Return whether matplotlib is installed."""
     try:
-        import matplotlib.figure  # noqa: F401 - only whether it is there
+        import matplotlib.figure  # noqa: F401 - checks that it is installed
     except ImportError:
         return False
     return True
@@ -173,7 +173,7 @@ def _lay_out(figure: Figure) -> None:
 
 
 def _with_few_colours(figure: Figure) -> Image.Image:
-    """Draw a figure with a palette: a third of the bytes, and reports are kept in repositories."""
+    """Draw a figure with a palette: a third of the bytes, as reports are kept in repositories."""
     from PIL import Image, ImageColor
 
     drawn = BytesIO()
@@ -181,11 +181,11 @@ def _with_few_colours(figure: Figure) -> Image.Image:
     with Image.open(drawn) as image:
         full = image.convert("RGB")
     found = full.quantize(_COLOURS, dither=Image.Dither.NONE).getpalette() or []
-    # What few points have would be given the colour of others: ours are in it, come what may, and
-    # none beside them, between which Pillow would choose by chance.
+    # Pillow would drop colours of few points. The palette therefore contains all of ours, and no
+    # similar ones, among which Pillow would choose by chance.
     own = np.array([ImageColor.getrgb(colour) for colour in (*PALETTE, "white", "black")])
     others = np.reshape(found, (-1, 3))
-    apart = np.abs(others[:, None] - own).max(axis=2).min(axis=1) > _ALIKE
+    apart = np.abs(others[:, None] - own).max(axis=2).min(axis=1) > _SAME_COLOUR
     palette = Image.new("P", (1, 1))
     palette.putpalette(np.concatenate([own, others[apart]]).flatten().tolist())
     return full.quantize(palette=palette, dither=Image.Dither.NONE)

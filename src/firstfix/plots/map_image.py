@@ -1,4 +1,4 @@
-"""A map as a picture, in the map frame."""
+"""The picture of a map, in the map frame."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from firstfix.core.grid import OccupancyGrid
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MAX_PIXELS = 2500  # a side; more than a page can show
+MAX_PIXELS = 2500  # a side; a page shows no more
 
 GREY_WALL, GREY_UNKNOWN, GREY_FREE = 40, 205, 255
 
 
 def draw_map(axes: Axes, grid: OccupancyGrid) -> None:
-    """Draw a map where it lies in the map frame, its yaw included; axes in m.
+    """Draw a map in the map frame, with its yaw; axes in m.
 
     Parameters
     ----------
@@ -58,8 +58,8 @@ def draw_map(axes: Axes, grid: OccupancyGrid) -> None:
 def greys(grid: OccupancyGrid, max_pixels: int) -> NDArray[np.uint8]:
     """Return the map in grey, row 0 at the bottom, at most ``max_pixels`` a side.
 
-    Where cells share a pixel the darkest is shown, so that thin walls stay: a wall before what
-    nobody knows before what is free.
+    A pixel of several cells shows the darkest, so that thin walls stay: occupied before unknown
+    before free.
     """
     return greys_of_blocks(grid, math.ceil(max(grid.cells.shape) / max_pixels))
 
@@ -72,7 +72,7 @@ def greys_of_blocks(grid: OccupancyGrid, step: int) -> NDArray[np.uint8]:
     if step == 1:
         return grey
     blocks = np.pad(grey, [(0, -grid.height % step), (0, -grid.width % step)], mode="edge")
-    # One pass for each place in a block: a minimum over two axes at once takes seven times as long.
+    # One pass for each offset in a block: a minimum over two axes takes seven times as long.
     darkest = blocks[::step, ::step].copy()
     for row in range(step):
         for column in range(step):

@@ -25,7 +25,7 @@ LOOK_COLOURS = {
 
 
 def draw_grid(grid: OccupancyGrid, path: Path, title: str, places: Sequence[Place] = ()) -> Path:
-    """Draw a map into a file, and places by how they look; the rest is as in `draw_answer`."""
+    """Draw a map into a file, and places by how they look; the rest is as in `draw_result`."""
     figure = new_figure(10.0, 10.0)
     axes = figure.subplots()
     draw_map(axes, grid)

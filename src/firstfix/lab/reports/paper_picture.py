@@ -17,9 +17,9 @@ from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.scoring import classify_beams
 from firstfix.lab.metrics.outcome import is_found
 from firstfix.lab.metrics.paper_trial import Attempt, Belief, Start
-from firstfix.plots.answer_picture import BEAM_COLOURS, ROBOT_M
 from firstfix.plots.figure import BLUE, GREEN, RED, SKY, new_figure, save_figure
 from firstfix.plots.map_image import draw_map
+from firstfix.plots.result_picture import BEAM_COLOURS, ROBOT_M
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -1,4 +1,4 @@
-"""A picture of an answer: the map, the places that fit, and the scan at the best of them."""
+"""The picture of a result: the map, the places that fit, and the scan at the best one."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ BEAM_COLOURS = {
 }
 
 
-def draw_answer(
+def draw_result(
     grid: OccupancyGrid,
     scan: LaserScan,
     result: LocateResult,
     path: Path,
     truth: SE2 | None = None,
 ) -> Path:
-    """Draw a result into a file, as `answer_figure` does.
+    """Draw a result into a file, as `result_figure` does.
 
     Parameters
     ----------
     grid, scan, result, truth
-        As in `answer_figure`.
+        As in `result_figure`.
     path : Path
         File to write; its suffix gives the format: .png, .svg or .pdf.
 
@@ -60,10 +60,10 @@ def draw_answer(
     InputError
         If it cannot be written, or matplotlib is not installed.
     """
-    return save_figure(answer_figure(grid, scan, result, truth), path)
+    return save_figure(result_figure(grid, scan, result, truth), path)
 
 
-def answer_figure(
+def result_figure(
     grid: OccupancyGrid, scan: LaserScan, result: LocateResult, truth: SE2 | None = None
 ) -> Figure:
     """Draw a result: the whole map with all places, and the scan at the best place.
@@ -75,7 +75,7 @@ def answer_figure(
     scan : LaserScan
         The scan.
     result : LocateResult
-        The answer.
+        The result.
     truth : SE2 or None
         ``T_map_base`` where it is known.
 
