@@ -31,7 +31,7 @@ from firstfix.lab.metrics.kidnap_trial import (
     Trial,
     judge_trial,
 )
-from firstfix.lab.reports.output_files import write_page
+from firstfix.lab.reports.output_files import make_folder, write_page
 from firstfix.lab.reports.text import Row, columns_table
 from firstfix.plots.figure import line_style, new_figure, save_figure, share_curve
 
@@ -305,6 +305,7 @@ def _said(instants: Sequence[Instant], begin_s: float, end_s: float) -> tuple[st
 
 def write_kidnap_report(runs: Sequence[KidnapRun], document: dict[str, Any], folder: Path) -> Path:
     """Write ``report.md`` with its plot into a folder and return it; see `write_page`."""
+    make_folder(folder)
     save_recovery_curves(runs, folder / "time_to_recover.png")
     return write_page(_parts(document), folder)
 

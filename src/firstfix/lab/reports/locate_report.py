@@ -18,7 +18,7 @@ from firstfix.lab.reports.locate_document import (
     sensors_table,
     wrong_map_table,
 )
-from firstfix.lab.reports.output_files import write_page
+from firstfix.lab.reports.output_files import make_folder, write_page
 from firstfix.lab.reports.reliability_picture import save_reliability
 from firstfix.plots.figure import (
     PALETTE,
@@ -56,6 +56,7 @@ RELIABILITY = (
 
 def write_report(runs: Sequence[CaseRun], document: dict[str, Any], folder: Path) -> Path:
     """Write ``report.md`` with its plots into a folder and return it; see `write_page`."""
+    make_folder(folder)
     save_error_curves(runs, folder / "error_curves.png")
     save_times(runs, folder / "time_by_area.png")
     save_reliability(document["reliability"], folder / "reliability.png")

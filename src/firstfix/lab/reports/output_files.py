@@ -43,8 +43,13 @@ def check_targets(json_file: Path | None, report: Path | None) -> None:
         check_file(json_file)
     if report is not None:
         new_figure(1.0, 1.0)
-        with _writing(report):
-            report.mkdir(parents=True, exist_ok=True)
+        make_folder(report)
+
+
+def make_folder(folder: Path) -> None:
+    """Create the folder of a report if it is missing; raises InputError if that is impossible."""
+    with _writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
 
 
 def write_json(document: dict[str, Any], path: Path) -> None:

@@ -23,7 +23,7 @@ import numpy as np
 from firstfix.lab.experiments.machine import machine_text, this_machine
 from firstfix.lab.metrics.metrics import mean_of_known
 from firstfix.lab.metrics.paper_trial import MISLED_S, STAYS_S, WORDS, Ending, Start, Trial
-from firstfix.lab.reports.output_files import write_page
+from firstfix.lab.reports.output_files import make_folder, write_page
 from firstfix.lab.reports.paper_picture import Shown, draw_starts
 from firstfix.lab.reports.text import Row, columns_table, markdown_table
 
@@ -107,6 +107,7 @@ def details_table(document: Row) -> str:
 
 def write_paper_report(shown: Sequence[Shown], document: dict[str, Any], folder: Path) -> Path:
     """Write ``report.md`` with a picture of one drive of each world; see `write_page`."""
+    make_folder(folder)
     names = {drive.world: f"{drive.world}.png" for drive in shown}
     for drive in shown:
         draw_starts(drive, folder / names[drive.world])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from firstfix.lab.experiments.ablation import ablation_table
 from firstfix.lab.experiments.machine import machine_text
 from firstfix.lab.experiments.scaling import cost_table, threads_table
-from firstfix.lab.reports.output_files import write_page
+from firstfix.lab.reports.output_files import make_folder, write_page
 from firstfix.lab.reports.text import Row
 from firstfix.plots.figure import PALETTE, new_figure, number_plainly, save_figure
 
@@ -54,6 +54,7 @@ def write_ablation_report(document: dict[str, Any], folder: Path) -> Path:
 
 def write_scaling_report(document: dict[str, Any], folder: Path) -> Path:
     """Write ``report.md`` with its plot into a folder and return it; see `write_page`."""
+    make_folder(folder)
     save_scaling(document, folder / "scaling.png")
     return write_page(
         [
