@@ -40,6 +40,8 @@ _MODES = {
 # Pillow stretches greys of 1, 2 and 4 bits to 8 bits, but not the grey declared transparent.
 _KEY_SCALES = {"1": 255, "L;2": 85, "L;4": 17}
 
+_ROWS = 256
+
 # Pillow's parsers raise all of these on damaged files.
 _DAMAGE = (
     *(OSError, SyntaxError, ValueError, LookupError, TypeError, AttributeError, AssertionError),
@@ -147,13 +149,17 @@ def _decode(path: Path, magic: bytes) -> MapImage:
         kind = f"{name} {_MODES[image.mode]}"
         tile: Any = image.tile[0]
         codec, _, offset, arguments = tile
-        if magic[:2] in (b"P5", b"P6") and codec == "ppm":
-            return _read_raw(image, path, offset, arguments[-1], kind)
+        if magic.startswith((b"P5", b"P6")):
+            raw_maxval = 65_535 if image.mode == "I" else 255
+            return _read_raw(
+                image, path, offset, arguments[-1] if codec == "ppm" else raw_maxval, kind
+            )
         scale = _KEY_SCALES.get(str(arguments), 1)
         image.load()
         pixels: Image = image
-        if image.mode in ("P", "RGB"):
-            pixels = image.convert("RGBA" if "transparency" in image.info else "RGB")
+        has_key = "transparency" in image.info
+        if image.mode == "P" or (image.mode == "RGB" and has_key):
+            pixels = image.convert("RGBA" if has_key else "RGB")
         levels, white = _levels(pixels)
         return MapImage(levels, white, _transparent(pixels, levels, scale), kind)
 
@@ -174,7 +180,7 @@ def _check_size(path: Path, width: int, height: int) -> None:
 
 
 def _read_raw(image: ImageFile, path: Path, offset: int, maxval: int, kind: str) -> MapImage:
-    """Read a raw PGM or PPM whose white is not 255: Pillow would loop in Python, and round."""
+    """Read a raw PGM or PPM; if white is not 255, Pillow would loop in Python, and round."""
     channels = 3 if image.mode == "RGB" else 1
     dtype = np.dtype(np.uint8 if maxval < 256 else ">u2")
     count = image.width * image.height * channels
@@ -196,9 +202,10 @@ def _levels(image: Image) -> tuple[NDArray[Any], int]:
         return np.asarray(image.getchannel(0)), 255
     if image.mode in ("I;16", "I"):
         return np.asarray(image).astype(np.uint16), 65_535
-    levels = np.zeros((image.height, image.width), np.uint16)
-    for channel in range(3):
-        levels += np.asarray(image.getchannel(channel))
+    levels = np.empty((image.height, image.width), np.uint16)
+    for top in range(0, image.height, _ROWS):  # in strips: a copy of all channels is large
+        strip = np.asarray(image.crop((0, top, image.width, min(top + _ROWS, image.height))))
+        levels[top : top + _ROWS] = strip[..., 0].astype(np.uint16) + strip[..., 1] + strip[..., 2]
     return levels, 765
 
 
