@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -96,11 +97,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "monitor.rest_period_s": {"to": 0.05, "in": "rooms"},
     "monitor.correct_m": {"to": 0.01},
     "monitor.correct_rad": {"to": 0.003},
-    "monitor.decided_probability": {
-        "to": 1.0,
-        "in": "rooms",
-        "with": {"monitor.decided_views": 1},
-    },
+    "monitor.decided_probability": {"to": 1.0, "with": {"locate.unique_probability": 1.0}},
     "monitor.decided_cost": {"to": 0.002},
     "monitor.decided_views": {"to": 1, "in": "rooms", "with": {"monitor.decided_probability": 0.5}},
 }
@@ -168,6 +165,7 @@ def outcome(
     monkeypatch.setattr(
         "firstfix.ros.node.cache_folder", lambda: tmp_path_factory.getbasetemp() / "maps"
     )
+    monkeypatch.setattr("firstfix.ros.node.time", SimpleNamespace(monotonic=lambda: 0.0))
     monkeypatch.chdir(tmp_path)
     save_map(OccupancyGrid(np.eye(50, dtype=np.int8) * 100, 0.05), tmp_path / "map.yaml")
 

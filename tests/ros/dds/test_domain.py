@@ -50,6 +50,16 @@ def test_localhost_means_no_multicast_and_one_peer(environment):
     assert peers(**environment) == ["localhost"]
 
 
+@pytest.mark.parametrize("distribution", ["foxy", "galactic", "humble"])
+def test_before_iron_localhost_keeps_multicast_on_the_loopback_interface(distribution):
+    environment = {"ROS_LOCALHOST_ONLY": "1", "ROS_DISTRO": distribution}
+    root = configuration(**environment)
+    assert root.find("*/General/AllowMulticast") is None
+    (interface,) = root.iter("NetworkInterface")
+    assert interface.get("address") == "127.0.0.1"
+    assert peers(**environment) == ["127.0.0.1"]
+
+
 def test_the_older_variable_counts_where_both_are_set():
     both = {"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
     assert peers(**both, ROS_STATIC_PEERS="10.0.0.1") == ["localhost"]

@@ -1,6 +1,7 @@
 """The node on a real network of DDS, in a process of its own as users start it."""
 
 import signal
+import subprocess
 import sys
 import time
 
@@ -234,3 +235,37 @@ def test_a_configuration_that_cyclone_dds_refuses_is_wrong_input(monkeypatch, ca
     monkeypatch.setenv("ROS_DOMAIN_ID", "231")
     assert run(["dds"]) == 2
     assert "CYCLONEDDS_URI" in capsys.readouterr().err
+
+
+# What rmw_cyclonedds of Humble makes of ROS_LOCALHOST_ONLY=1.
+HUMBLE = "<General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces></General>"
+PEER = """
+import sys, time
+from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsParticipant
+from cyclonedds.domain import Domain, DomainParticipant
+domain = Domain(int(sys.argv[1]), sys.argv[2])
+participant = DomainParticipant(int(sys.argv[1]))
+others = BuiltinDataReader(participant, BuiltinTopicDcpsParticipant)
+while all(sample.key == participant.guid for sample in others.read(10)):
+    time.sleep(0.05)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("order", ["the robot first", "the robot last"])
+def test_a_robot_of_humble_that_is_restricted_to_localhost_is_found(dds, order):
+    environment = {"ROS_LOCALHOST_ONLY": "1", "ROS_DISTRO": "humble", "CYCLONEDDS_URI": ""}
+    command = [sys.executable, "-c", PEER, str(dds.domain), HUMBLE]
+    if order == "the robot first":
+        robot = subprocess.Popen(command)
+        time.sleep(2.0)
+        dds.node(**environment)
+    else:
+        node = dds.node(**environment)
+        wait_for(lambda: "no message on" in node.log)
+        robot = subprocess.Popen(command)
+    try:
+        assert robot.wait(60.0) == 0
+    finally:
+        robot.kill()
+        robot.wait()

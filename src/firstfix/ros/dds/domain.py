@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
@@ -13,6 +13,7 @@ _LAST_DOMAIN = 232  # beyond it there are no ports
 _RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 # So many processes of one machine find each other without multicast; rmw_cyclonedds' number.
 _PROCESSES = 32
+_BEFORE_IRON = ("foxy", "galactic", "humble")
 # ROS 2 tells messages apart by their names. Fast DDS (1.15), for one, describes its types
 # otherwise than Cyclone DDS (1.16) does, and where descriptions differ nothing would be heard.
 _NAMES_COUNT = (
@@ -34,6 +35,11 @@ class DomainSettings:
 
     number: int
     configuration: str
+
+
+def is_before_iron(environment: Mapping[str, str] = os.environ) -> bool:
+    """Return whether ``ROS_DISTRO`` names a distribution before Iron."""
+    return environment.get("ROS_DISTRO", "") in _BEFORE_IRON
 
 
 def domain_settings(environment: Mapping[str, str] = os.environ) -> DomainSettings:
@@ -93,17 +99,23 @@ def _discovery(environment: Mapping[str, str]) -> str:
         # No other participant has the same tag.
         alone = f"<ParticipantIndex>none</ParticipantIndex><Tag>firstfix_{os.getpid()}</Tag>"
         return f"{_NO_MULTICAST}<Discovery>{alone}</Discovery>"
+    if reach == "LOCALHOST" and is_before_iron(environment):
+        return _LOOPBACK + _peers(["127.0.0.1"])
     text = "" if is_local or reach == "SYSTEM_DEFAULT" else environment.get("ROS_STATIC_PEERS", "")
     peers = [peer.strip() for peer in text.split(";") if peer.strip()]
     if reach == "LOCALHOST":
-        peers.insert(0, "localhost")
-    if not peers:
-        return ""
+        return _NO_MULTICAST + _peers(["localhost", *peers])
+    return _peers(peers) if peers else ""
+
+
+def _peers(peers: Sequence[str]) -> str:
+    """Return the configuration that looks for processes at these addresses, beside multicast."""
     listed = "".join(f"<Peer address={quoteattr(peer)}/>" for peer in peers)
     index = f"<MaxAutoParticipantIndex>{_PROCESSES}</MaxAutoParticipantIndex>"
     index = f"<ParticipantIndex>auto</ParticipantIndex>{index}"
-    found = f"<Discovery>{index}<Peers>{listed}</Peers></Discovery>"
-    return (_NO_MULTICAST if reach == "LOCALHOST" else "") + found
+    return f"<Discovery>{index}<Peers>{listed}</Peers></Discovery>"
 
 
 _NO_MULTICAST = "<General><AllowMulticast>false</AllowMulticast></General>"
+# Before Iron, ROS_LOCALHOST_ONLY restricts ROS to this interface, and multicast goes on there.
+_LOOPBACK = "<General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces></General>"

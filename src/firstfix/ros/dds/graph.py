@@ -9,7 +9,8 @@ import numpy as np
 from cyclonedds.core import Entity
 
 from firstfix.ros.channels import Delivery, Topic
-from firstfix.ros.dds.types import is_before_iron, make
+from firstfix.ros.dds.domain import is_before_iron
+from firstfix.ros.dds.types import make
 
 GRAPH = Topic("ros_discovery_info", "rmw_dds_common/ParticipantEntitiesInfo", Delivery.LATCHED)
 
@@ -51,6 +52,6 @@ def entities(
 
 
 def _gid(entity: Entity) -> Any:
-    size = 24 if is_before_iron() else 16
+    size = 24 if is_before_iron() else 16  # Iron shortened the ids of participants
     padded = entity.guid.bytes.ljust(size, b"\0")
     return make("rmw_dds_common/Gid", data=np.frombuffer(padded, np.uint8))

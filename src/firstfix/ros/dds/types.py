@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import os
 import struct
 from typing import Any
 
@@ -14,6 +13,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from firstfix.core.errors import InputError
+from firstfix.ros.dds.domain import is_before_iron
 
 # Messages of packages outside the ROS core.
 _DEFINITIONS = {
@@ -28,14 +28,7 @@ _DEFINITIONS = {
 }
 # Packages that ROS 2 names differently than `firstfix.ros.channels`.
 _PACKAGES = {"kobuki": "kobuki_ros_interfaces"}
-# Until then a participant's id in `ros_discovery_info` had 24 bytes; since Iron it has 16.
-_BEFORE_IRON = ("foxy", "galactic", "humble")
 _BASE = {"bool": bool, "byte": types.uint8, "char": types.uint8, "string": str}
-
-
-def is_before_iron() -> bool:
-    """Return whether ``ROS_DISTRO`` names a distribution before Iron."""
-    return os.environ.get("ROS_DISTRO", "") in _BEFORE_IRON
 
 
 @functools.cache
