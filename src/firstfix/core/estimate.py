@@ -248,7 +248,7 @@ class LocateResult:
         Parameters
         ----------
         path : str or Path, optional
-            File to write: .png, .svg or .pdf. Missing folders are made.
+            File to write: .png, .svg or .pdf, in an existing folder.
         truth : SE2, optional
             ``T_map_base`` where it is known.
 
