@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from firstfix.core.grid import OccupancyGrid
-from firstfix.lab.live.simulated_node import SimNode
-from firstfix.lab.live.steered_robot import SimRobot
+from firstfix.lab.live.simulated_node import SimulatedNode
+from firstfix.lab.live.simulated_robot import SimulatedRobot
 from firstfix.lab.worlds.catalog import WORLDS
 from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
@@ -44,7 +44,7 @@ class Site:
     page: Page
     url: str
     given: list[Input] = field(default_factory=list)
-    robot: SimRobot | None = None
+    robot: SimulatedRobot | None = None
 
     @property
     def store(self) -> SnapshotStore:
@@ -86,9 +86,9 @@ def simulated(
 ) -> Iterator[Site]:
     """Serve a simulated robot."""
     store = SnapshotStore("house")
-    robot = SimRobot(grid, seed)
+    robot = SimulatedRobot(grid, seed)
     wrong: list[str] = []
-    node = SimNode(grid, robot, [store], store.set_truth, wrong.append)
+    node = SimulatedNode(robot, store, wrong.append)
     page = Page("sim", store, CommandExecutor(store, node.give, robot), access or AccessPolicy())
     with served(page) as url:
         node.start()
@@ -103,7 +103,7 @@ def simulated(
 class Drive:
     """A robot that goes on by a scan only when the test says so."""
 
-    robot: SimRobot
+    robot: SimulatedRobot
     localizer: Localizer
     store: SnapshotStore
 
@@ -122,6 +122,6 @@ class Drive:
 def drive(world: str = "house", seed: int = 1) -> Drive:
     """Put a robot into a world, with its map and not yet a scan."""
     grid = WORLDS[world]()
-    begun = Drive(SimRobot(grid, seed), Localizer(), SnapshotStore(world))
+    begun = Drive(SimulatedRobot(grid, seed), Localizer(), SnapshotStore(world))
     begun.give(NewMap(0.0, grid))
     return begun

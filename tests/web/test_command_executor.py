@@ -10,19 +10,25 @@ from live_lab import drive
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.localizer.inputs import Input, PoseHint, Reset
-from firstfix.localizer.outputs import Hypotheses
+from firstfix.localizer.outputs import Hypotheses, MotionRequest
 from firstfix.localizer.states import State
 from firstfix.web.command_executor import CommandExecutor
 from firstfix.web.commands import (
     Carry,
     Command,
+    CoverSensor,
+    Decide,
     DriveTo,
+    Kidnap,
     Pause,
     PickPlace,
     Relocalize,
+    SelectSensor,
+    SelectWorld,
     SetPeople,
     SetPose,
 )
+from firstfix.web.snapshot import SimulationStatus
 
 
 class Recorder:
@@ -30,6 +36,16 @@ class Recorder:
 
     def __init__(self) -> None:
         self.calls: list[tuple[Any, ...]] = []
+
+    status = SimulationStatus("house", "360° x 12 m")
+    worlds, sensors = ("house", "office"), ("360° x 12 m",)
+
+    def kidnap(self) -> SE2:
+        self.calls.append(("kidnap",))
+        return SE2(1.0, 2.0, 0.0)
+
+    def cover_sensor(self, *, covered: bool) -> None:
+        self.calls.append(("cover_sensor", covered))
 
     def __getattr__(self, name: str) -> Any:
         return lambda *arguments: self.calls.append((name, *arguments))
@@ -84,10 +100,14 @@ def test_a_place_that_is_no_longer_listed_is_refused(ambiguous):
     ("command", "call"),
     [
         (Pause(True), ("pause",)),
-        (Pause(False), ("go_on",)),
+        (Pause(False), ("resume",)),
         (DriveTo(1.0, 2.0), ("drive_to", 1.0, 2.0)),
         (Carry(1.0, 2.0, 3.0), ("carry_to", SE2(1.0, 2.0, 3.0))),
-        (SetPeople(4), ("meet", 4)),
+        (SetPeople(4), ("set_people", 4)),
+        (Kidnap(), ("kidnap",)),
+        (CoverSensor(True), ("cover_sensor", True)),
+        (SelectSensor("60° x 5 m"), ("select_sensor", "60° x 5 m")),
+        (SelectWorld("office"), ("select_world", "office")),
     ],
 )
 def test_commands_of_the_simulation(ambiguous, command: Command, call: tuple[Any, ...]):
@@ -104,3 +124,22 @@ def test_commands_of_the_simulation(ambiguous, command: Command, call: tuple[Any
 def test_a_real_robot_is_not_controlled(ambiguous, command: Command, remedy: str):
     with pytest.raises(InputError, match=remedy):
         CommandExecutor(ambiguous.store, lambda _: None).execute(command)
+
+
+def test_the_deciding_motion_is_executed_while_there_is_one(ambiguous):
+    store, robot = ambiguous.store, Recorder()
+    executor = CommandExecutor(store, lambda _: None, robot)
+    store(Reset(0.0), [MotionRequest(3.0, 0.5, 2.0, 0.4)], ambiguous.localizer)
+    executor.execute(Decide())
+    assert robot.calls == [("move", 0.5, 2.0)]
+    ambiguous.give(Reset(store.snapshot.stamp))
+    with pytest.raises(InputError, match="no deciding motion"):
+        executor.execute(Decide())
+
+
+def test_the_menus_and_the_status_of_a_simulation_are_shown(ambiguous):
+    robot = Recorder()
+    executor = CommandExecutor(ambiguous.store, lambda _: None, robot)
+    assert (executor.menus.worlds, executor.menus.sensors) == (robot.worlds, robot.sensors)
+    assert ambiguous.store.snapshot.simulation == robot.status
+    assert CommandExecutor(ambiguous.store, lambda _: None).menus is None

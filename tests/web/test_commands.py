@@ -23,6 +23,11 @@ GOOD = {
     "goal": {"x": 0.0, "y": 1e6},
     "carry": {"x": 1.0, "y": 2.0, "yaw": -3.0},
     "people": {"count": 5},
+    "kidnap": {},
+    "cover": {"covered": True},
+    "sensor": {"name": "60° x 5 m"},
+    "world": {"name": "office"},
+    "decide": {},
     "token": {"token": "secret"},
 }
 json_values = st.recursive(

@@ -53,7 +53,7 @@ def test_numbers_that_json_does_not_have_become_null(localized):
 
 
 def test_hello_describes_the_map_and_the_rights(localized):
-    hello = Hello("sim", False, ("goal",), Map.of(localized.map), [])
+    hello = Hello("sim", False, ("goal",), Map.of(localized.map), None, [])
     said = json.loads(encode_text(hello))
     assert said["map"]["width"] == localized.map.grid.width
     assert (said["may_steer"], said["abilities"]) == (False, ["goal"])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -256,3 +257,43 @@ def test_what_is_shown_can_be_chosen(visit: Visitor, office_server: Server, devi
     x, y, yaw = page.pose()
     behind = page.colour("overlay", x - 3.0 * math.cos(yaw), y - 3.0 * math.sin(yaw))
     assert behind == (0, 0, 0, 0)
+
+
+def test_a_kidnapped_robot_is_found_without_a_signal(page: Visit) -> None:
+    before = page.pose("truth")
+    page.page.click("#kidnap")
+    match = page.wait_for_event(r"Kidnapped, with no signal: now at \((-?[\d.]+), (-?[\d.]+)\)")
+    assert math.dist((float(match[1]), float(match[2])), before[:2]) > 0.5
+    wait_until(lambda: page.pose() and is_near_truth(page, 0.3, 0.2), lambda: f"{page.pose()}")
+    assert not [text for text in page.events() if "Picked up" in text]
+
+
+def test_a_covered_sensor_keeps_the_pose(page: Visit) -> None:
+    page.page.click("#cover")
+    wait_until(lambda: "too little" in page.page.inner_text("#reason"), lambda: "nothing is seen")
+    assert page.page.inner_text("#cover") == "Uncover the sensor"
+    assert page.data("state") == "LOCALIZED"
+    page.page.click("#cover")
+    wait_until(lambda: "beams fit" in page.page.inner_text("#reason"), lambda: "it sees again")
+
+
+@pytest.fixture
+def changing_server(chromium: Any) -> Iterator[Server]:
+    """Give a robot of one test alone, which changes its world."""
+    server = Server("office", "--seed", "1").start()
+    yield server
+    server.stop()
+
+
+def test_sensor_and_world_are_chosen_from_menus(changing_server: Server, visit: Visitor) -> None:
+    page = visit(changing_server.url)
+    page.wait_for_fix()
+    page.page.select_option("#sensor", "180° x 8 m")
+    page.wait_for_event("Sensor: 180° x 8 m")
+    page.page.select_option("#world", "rooms")
+    page.page.wait_for_selector("#app[data-map=rooms]")
+    page.wait_for_state("DISAMBIGUATING")
+    assert page.page.input_value("#sensor") == "180° x 8 m"
+    assert page.page.inner_text("#map-name") == "rooms"
+    simulation = {"world": "rooms", "sensor": "180° x 8 m", "covered": False}
+    assert changing_server.status()["simulation"] == simulation

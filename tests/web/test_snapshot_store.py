@@ -12,6 +12,7 @@ from firstfix.core.se2 import SE2
 from firstfix.lab.worlds.catalog import random_free_poses
 from firstfix.localizer.inputs import PoseHint, Reset
 from firstfix.localizer.states import State
+from firstfix.web.snapshot import SimulationStatus
 from firstfix.web.timeline import MOST_EVENTS
 
 ASLEEP = 20  # silent scans at the start of a simulated robot
@@ -137,9 +138,9 @@ def test_whoever_listens_is_called_until_they_hang_up(found):
     found.store.unsubscribe(changed)
     calls.clear()
     found.step()
-    found.store.set_paused(paused=True)
+    found.store.set_simulation(SimulationStatus("house", "any", is_paused=True))
     assert calls == []
-    assert found.store.snapshot.paused
+    assert found.store.snapshot.simulation.is_paused
 
 
 def test_the_processor_time_is_that_of_the_localizer_alone(found):

@@ -24,6 +24,7 @@ from firstfix.lab.worlds.catalog import WORLDS
 from firstfix.localizer.inputs import NewMap, PoseHint, Reset
 from firstfix.web.access_control import AccessPolicy
 from firstfix.web.broadcaster import MOST_VIEWERS, Broadcaster, Viewer
+from firstfix.web.command_executor import ABILITIES
 from firstfix.web.timeline import MOST_EVENTS
 
 ASLEEP = 20
@@ -390,7 +391,7 @@ def test_a_story_with_a_simulated_robot():
         hello = next_of(one, "hello")
         assert (hello["robot"], set(hello["abilities"])) == (
             "sim",
-            {"goal", "carry", "people", "pause"},
+            set(ABILITIES),
         )
         until(lambda: next_of(one, "state")["state"] == "LOCALIZED")
         state = until(lambda: (s := next_of(one, "state"))["pose"] and s)
@@ -417,4 +418,4 @@ def test_a_story_with_a_simulated_robot():
             return next_of(one, "error")["detail"]
 
         # Found by the first scan after it stands, perhaps before the hands are off.
-        until(lambda: "free space" in refused())
+        until(lambda: "too close to a wall" in refused())

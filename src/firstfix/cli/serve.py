@@ -137,8 +137,8 @@ def serve_simulated(
         If it cannot be served at this address.
     """
     from firstfix.global_localization.searchable import check_searchable
-    from firstfix.lab.live.simulated_node import SimNode
-    from firstfix.lab.live.steered_robot import SimRobot
+    from firstfix.lab.live.simulated_node import SimulatedNode
+    from firstfix.lab.live.simulated_robot import SimulatedRobot
     from firstfix.web.command_executor import CommandExecutor
     from firstfix.web.page import Page
     from firstfix.web.server import listen, make_server
@@ -153,12 +153,12 @@ def serve_simulated(
             typer.echo(text, err=True)
             store.add_event("warning", text.partition("\n")[0])
 
-        robot = SimRobot(grid, seed)
+        robot = SimulatedRobot(grid, seed, name)
         if rest is Rest.SLEEPS:
             robot.pause()
-        node = SimNode(grid, robot, [store], store.set_truth, warn)
+        node = SimulatedNode(robot, store, warn)
         executor = CommandExecutor(store, node.give, robot)
-        page = Page("sim", store, executor, access, on_first_viewer=robot.go_on)
+        page = Page("sim", store, executor, access, on_first_viewer=robot.resume)
         node.start()
         _announce(listening, access)
         with suppress(KeyboardInterrupt):  # the usual end

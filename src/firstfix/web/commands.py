@@ -18,6 +18,7 @@ Yaw = Annotated[
     float,
     Meta(ge=-FARTHEST_M, le=FARTHEST_M, description="heading, rad, counter-clockwise from +x"),
 ]
+Name = Annotated[str, Meta(max_length=200, description="one of the names in hello")]
 
 
 class Pose(Struct, frozen=True):
@@ -70,12 +71,40 @@ class SetPeople(Struct, frozen=True, tag_field="type", tag="people"):
     count: Annotated[int, Meta(ge=0, le=MOST_PEOPLE, description="number of people")]
 
 
+class Kidnap(Struct, frozen=True, tag_field="type", tag="kidnap"):
+    """Teleport the simulated robot to a random place, with no signal of any sensor."""
+
+
+class CoverSensor(Struct, frozen=True, tag_field="type", tag="cover"):
+    """Cover or uncover the sensor of the simulated robot."""
+
+    covered: bool
+
+
+class SelectSensor(Struct, frozen=True, tag_field="type", tag="sensor"):
+    """Exchange the sensor of the simulated robot."""
+
+    name: Name
+
+
+class SelectWorld(Struct, frozen=True, tag_field="type", tag="world"):
+    """Restart the simulation in another world."""
+
+    name: Name
+
+
+class Decide(Struct, frozen=True, tag_field="type", tag="decide"):
+    """Let the simulated robot execute the deciding motion."""
+
+
 class Token(Struct, frozen=True, tag_field="type", tag="token"):
     """Authenticate; the first message where the server asks for a token."""
 
     token: str
 
 
-SimulationCommand = Pause | DriveTo | Carry | SetPeople
+SimulationCommand = (
+    Pause | DriveTo | Carry | SetPeople | Kidnap | CoverSensor | SelectSensor | SelectWorld | Decide
+)
 Command = SetPose | PickPlace | Relocalize | SimulationCommand
 ClientMessage = Command | Token

@@ -81,6 +81,21 @@ class Motion(Struct, frozen=True):
     ahead: Annotated[float, Meta(description="then drive straight, m")]
 
 
+class Simulation(Struct, frozen=True):
+    """World and sensor of a simulated robot, and whether the sensor is covered."""
+
+    world: str
+    sensor: str
+    covered: bool
+
+
+class Menus(Struct, frozen=True):
+    """The choices of the `world` and `sensor` commands."""
+
+    worlds: tuple[str, ...]
+    sensors: tuple[str, ...]
+
+
 class Hello(Struct, frozen=True, tag_field="type", tag="hello"):
     """The first message: what the robot is and what can be done."""
 
@@ -88,6 +103,7 @@ class Hello(Struct, frozen=True, tag_field="type", tag="hello"):
     may_steer: bool
     abilities: tuple[str, ...]
     map: Map | None
+    menus: Menus | None
     events: list[Event]
     version: str = __version__
 
@@ -114,12 +130,14 @@ class Status(Struct, frozen=True, tag_field="type", tag="state"):
     motion: Motion | None
     truth: Pose | None
     paused: bool
+    simulation: Simulation | None
     viewers: Count
 
     @classmethod
     def of(cls, snapshot: Snapshot, viewers: int) -> Status:
         """Describe a snapshot."""
         pose, motion, cloud = snapshot.pose, snapshot.motion, snapshot.particles
+        sim = snapshot.simulation
         return cls(
             stamp=snapshot.stamp,
             state=snapshot.state,
@@ -135,7 +153,8 @@ class Status(Struct, frozen=True, tag_field="type", tag="state"):
             time_to_fix_s=snapshot.time_to_fix_s,
             motion=None if motion is None else Motion(motion.turn, motion.ahead),
             truth=None if snapshot.truth is None else as_tuple(snapshot.truth),
-            paused=snapshot.paused,
+            paused=sim is not None and sim.is_paused,
+            simulation=None if sim is None else Simulation(sim.world, sim.sensor, sim.is_covered),
             viewers=viewers,
         )
 

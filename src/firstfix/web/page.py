@@ -60,6 +60,7 @@ class Page:
                 robot=self.robot,
                 may_steer=self.access.may_steer,
                 abilities=self.executor.abilities,
+                menus=self.executor.menus,
                 map=None if active_map is None else Map.of(active_map),
                 events=self.store.events(),
             )

@@ -55,6 +55,16 @@ class ParticleCloud:
     T_map_base: SE2
 
 
+@dataclass(frozen=True, slots=True)
+class SimulationStatus:
+    """What viewers can change in the simulation: world, sensor, clock, and its cover."""
+
+    world: str
+    sensor: str
+    is_paused: bool = False
+    is_covered: bool = False
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Snapshot:
     """Everything that changes from scan to scan. Frozen, so that any thread may read it.
@@ -93,8 +103,8 @@ class Snapshot:
         Duration of the last successful search, s.
     truth : SE2 or None
         ``T_map_base`` of a simulated robot.
-    paused : bool
-        True while the simulated clock is stopped.
+    simulation : SimulationStatus or None
+        None for a real robot.
     """
 
     map: ActiveMap | None = None
@@ -113,4 +123,4 @@ class Snapshot:
     cpu_ms: float | None = None
     time_to_fix_s: float | None = None
     truth: SE2 | None = None
-    paused: bool = False
+    simulation: SimulationStatus | None = None

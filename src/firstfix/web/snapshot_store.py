@@ -15,7 +15,13 @@ from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Hypotheses, MotionRequest, Output, Status, TrackedPose
 from firstfix.localizer.states import State
-from firstfix.web.snapshot import ActiveMap, ParticleCloud, RegisteredScan, Snapshot
+from firstfix.web.snapshot import (
+    ActiveMap,
+    ParticleCloud,
+    RegisteredScan,
+    SimulationStatus,
+    Snapshot,
+)
 from firstfix.web.timeline import Event, Timeline
 from firstfix.web.timing import TimingStatistics
 
@@ -37,8 +43,7 @@ class SnapshotStore:
     def __init__(self, map_name: str) -> None:
         self._lock = threading.Lock()
         self._snapshot = Snapshot()
-        # A file name may have bytes that are not UTF-8, and JSON cannot have them.
-        self._map_name = map_name.encode(errors="replace").decode()
+        self.set_map_name(map_name)
         self._timeline = Timeline()
         self._timing = TimingStatistics()
         self._scans: deque[LaserScan] = deque(maxlen=_MOST_SCANS)
@@ -73,11 +78,16 @@ class SnapshotStore:
         with self._lock:
             self._snapshot = replace(self._snapshot, truth=truth)
 
-    def set_paused(self, *, paused: bool) -> None:
-        """Set whether the simulated clock is stopped."""
+    def set_simulation(self, simulation: SimulationStatus) -> None:
+        """Set the status of the simulation."""
         with self._lock:
-            self._snapshot = replace(self._snapshot, paused=paused)
+            self._snapshot = replace(self._snapshot, simulation=simulation)
         self._notify()
+
+    def set_map_name(self, name: str) -> None:
+        """Set the name of the next map."""
+        # A file name may have bytes that are not UTF-8, and JSON cannot have them.
+        self._map_name = name.encode(errors="replace").decode()
 
     def __call__(self, given: Input, outputs: list[Output], localizer: Localizer) -> None:
         """Store the outputs for an input; called by the localizer's thread."""
@@ -97,6 +107,7 @@ class SnapshotStore:
         self._timing.start_input()
 
     def _store_map(self, given: NewMap, localizer: Localizer) -> None:
+        self._scans.clear()
         if localizer.matcher is not None:
             key = map_key(given.grid)
             active_map = ActiveMap(self._map_name, key, given.grid, localizer.matcher)

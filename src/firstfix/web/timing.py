@@ -32,7 +32,7 @@ class TimingStatistics:
     def end_input(self, given: Input, outputs: list[Output], state: State) -> None:
         """Count an input and its outputs; ``state`` is the state before it."""
         self._spent_s += time.thread_time() - self._left_at_s
-        if state in {State.LOCALIZED, State.NO_MAP, State.LIFTED}:
+        if isinstance(given, NewMap) or state in {State.LOCALIZED, State.NO_MAP, State.LIFTED}:
             self._began = None
         elif isinstance(given, LaserScan) and self._began is None:
             self._began = given.stamp

@@ -15,8 +15,8 @@ from firstfix.core.errors import InputError
 from firstfix.core.grid import FREE, OCCUPIED, OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.lab.live.simulated_node import SimNode
-from firstfix.lab.live.steered_robot import SimRobot
+from firstfix.lab.live.simulated_node import SimulatedNode
+from firstfix.lab.live.simulated_robot import SimulatedRobot
 from firstfix.lab.worlds.catalog import WORLDS
 from firstfix.localizer.inputs import NewMap, PoseHint
 from firstfix.localizer.localizer import Localizer
@@ -27,81 +27,91 @@ HOUSE = WORLDS["house"]()
 
 
 class Diary:
-    """A watcher that takes everything down."""
+    """A store that records everything."""
 
-    def __init__(self) -> None:
+    def __init__(self, observer: Any = None) -> None:
         self.given: list[Any] = []
         self.outputs: list[Any] = []
         self.truths: list[SE2] = []
-        self.complaints: list[str] = []
+        self.warnings: list[str] = []
+        self.map_names: list[str] = []
         self.threads: set[str] = set()
         self.state = State.NO_MAP
+        self._observer = observer
 
     def __call__(self, given: Any, outputs: list[Any], localizer: Localizer) -> None:
         self.given.append(given)
         self.outputs += outputs
         self.state = localizer.state
         self.threads.add(threading.current_thread().name)
+        if self._observer is not None:
+            self._observer(given)
+
+    def set_truth(self, T_map_base: SE2) -> None:
+        self.truths.append(T_map_base)
+
+    def set_map_name(self, name: str) -> None:
+        self.map_names.append(name)
 
 
 @contextmanager
-def living(grid: OccupancyGrid, robot: SimRobot, *more: Any) -> Iterator[tuple[SimNode, Diary]]:
-    diary = Diary()
-    node = SimNode(grid, robot, [diary, *more], diary.truths.append, diary.complaints.append)
+def running(robot: SimulatedRobot, observer: Any = None) -> Iterator[tuple[SimulatedNode, Diary]]:
+    diary = Diary(observer)
+    node = SimulatedNode(robot, diary, diary.warnings.append)
     node.start()
     yield node, diary
     node.stop()
 
 
 def test_it_is_found_and_told_where_it_truly_is():
-    with living(HOUSE, SimRobot(HOUSE, 1)) as (_, diary):
+    with running(SimulatedRobot(HOUSE, 1)) as (_, diary):
         until(lambda: diary.state is State.LOCALIZED)
     assert isinstance(diary.given[0], NewMap)
     found = next(output for output in diary.outputs if isinstance(output, InitialPose))
     assert found.T_map_base.distance_to(diary.truths[20]) < 0.1
     assert diary.threads == {"firstfix"}
-    assert diary.complaints == []
+    assert diary.warnings == []
 
 
 def test_what_is_given_is_taken_at_once_also_while_the_robot_is_paused():
-    robot = SimRobot(HOUSE, 1)
-    with living(HOUSE, robot) as (node, diary):
+    robot = SimulatedRobot(HOUSE, 1)
+    with running(robot) as (node, diary):
         until(lambda: diary.state is State.LOCALIZED)
         robot.pause()
         hint = PoseHint(0.0, SE2(1.0, 1.0, 0.0))
         node.give(hint)
         until(lambda: hint in diary.given)
         assert diary.state is State.VERIFYING_HINT
-        robot.go_on()
+        robot.resume()
         until(lambda: diary.state is State.LOCALIZED)
 
 
 def test_what_goes_wrong_is_told_and_it_goes_on():
     wrong = iter(["once"])
 
-    def stumbles(given: Any, *_: Any) -> None:
+    def stumbles(given: Any) -> None:
         if isinstance(given, LaserScan) and next(wrong, None):
             raise RuntimeError("over its own feet")
 
-    with living(HOUSE, SimRobot(HOUSE, 1), stumbles) as (_, diary):
-        until(lambda: diary.complaints)
+    with running(SimulatedRobot(HOUSE, 1), stumbles) as (_, diary):
+        until(lambda: diary.warnings)
         until(lambda: sum(isinstance(given, LaserScan) for given in diary.given) > 3)
-    assert len(diary.complaints) == 1
-    assert "over its own feet" in diary.complaints[0]
+    assert len(diary.warnings) == 1
+    assert "over its own feet" in diary.warnings[0]
 
 
 def test_a_map_in_which_nothing_can_be_found_is_told():
     cells = np.full((100, 100), FREE, np.int8)
     bare = OccupancyGrid(cells, 0.05)
-    with living(bare, SimRobot(bare, 1)) as (_, diary):
-        until(lambda: diary.complaints)
-        assert "wall" in diary.complaints[0]
+    with running(SimulatedRobot(bare, 1)) as (_, diary):
+        until(lambda: diary.warnings)
+        assert "wall" in diary.warnings[0]
 
 
 def test_the_same_seed_gives_the_same_first_pose():
     poses = []
     for _ in range(2):
-        with living(HOUSE, SimRobot(HOUSE, 7)) as (_, diary):
+        with running(SimulatedRobot(HOUSE, 7)) as (_, diary):
             until(lambda diary=diary: diary.state is State.LOCALIZED)
         first = next(output for output in diary.outputs if isinstance(output, InitialPose))
         poses.append(first.T_map_base)
@@ -112,4 +122,29 @@ def test_a_building_without_room_is_refused():
     cells = np.full((10, 10), OCCUPIED, np.int8)
     cells[4:6, 4:6] = FREE
     with pytest.raises(InputError, match="free place"):
-        SimRobot(OccupancyGrid(cells, 0.05), 1)
+        SimulatedRobot(OccupancyGrid(cells, 0.05), 1)
+
+
+def test_another_world_gets_its_map_a_new_clock_and_a_new_localizer():
+    robot = SimulatedRobot(HOUSE, 1)
+    with running(robot) as (_, diary):
+        until(lambda: diary.state is State.LOCALIZED)
+        robot.select_world("rooms")
+        until(lambda: diary.map_names)
+        until(lambda: diary.state is State.DISAMBIGUATING)
+    maps = [given for given in diary.given if isinstance(given, NewMap)]
+    assert [given.grid for given in maps] == [HOUSE, robot.grid]
+    assert diary.map_names == ["rooms"]
+    later = diary.given[diary.given.index(maps[1]) :]
+    assert next(given.stamp for given in later if isinstance(given, LaserScan)) < 10.0
+    assert diary.warnings == []
+
+
+def test_a_covered_sensor_keeps_the_pose():
+    robot = SimulatedRobot(HOUSE, 1)
+    with running(robot) as (_, diary):
+        until(lambda: diary.state is State.LOCALIZED)
+        robot.cover_sensor(covered=True)
+        seen = len(diary.given)
+        until(lambda: sum(isinstance(given, LaserScan) for given in diary.given[seen:]) > 20)
+        assert diary.state is State.LOCALIZED

@@ -1,85 +1,67 @@
-"""The localizer of a simulated robot: both live in one thread, as fast as the clock on the wall."""
+"""The node of a simulated robot: robot and localizer share one thread and run in real time."""
 
 from __future__ import annotations
 
 import threading
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from firstfix.core.errors import InputError
-from firstfix.core.grid import OccupancyGrid
-from firstfix.core.se2 import SE2
 from firstfix.fields.cache import cache_folder
-from firstfix.lab.live.steered_robot import SimRobot
+from firstfix.lab.live.simulated_robot import SimulatedRobot
 from firstfix.lab.simulation.simulation import PERIOD_S
 from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.precompile import precompile
 from firstfix.ros.inbox import Inbox
-from firstfix.ros.node import Watcher
+from firstfix.web.snapshot_store import SnapshotStore
 
-# After that, whatever is being thought is left alone.
+# Longest wait for the present step at the end.
 _END_S = 5.0
 
 
-class SimNode:
-    """Lets a robot live, and a localizer find and follow it.
+class SimulatedNode:
+    """Advances a simulated robot, and localizes it.
 
-    A search keeps the robot waiting, not the other way round: whatever the machine, the same orders
-    at the same scans lead to the same story.
+    A search delays the robot. So the same commands at the same scans give the same result on every
+    machine.
 
     Parameters
     ----------
-    grid : OccupancyGrid
-        The map.
-    robot : SimRobot
-        Who lives in it.
-    watchers : sequence of Watcher
-        Who is told what came in and what it led to; in the thread of the node.
-    know : callable
-        Takes where the robot truly is (``T_map_base``), just before what it reports from there.
-    complain : callable
-        Takes what went wrong, for people.
+    robot : SimulatedRobot
+        The robot, with its world.
+    store : SnapshotStore
+        Receives inputs, outputs and the true pose, in the thread of the node.
+    warn : callable
+        Receives what went wrong, as text.
     """
 
     def __init__(
-        self,
-        grid: OccupancyGrid,
-        robot: SimRobot,
-        watchers: Sequence[Watcher],
-        know: Callable[[SE2], None],
-        complain: Callable[[str], None],
+        self, robot: SimulatedRobot, store: SnapshotStore, warn: Callable[[str], None]
     ) -> None:
-        self._grid = grid
         self._robot = robot
-        self._watchers = watchers
-        self._know = know
-        self._complain = complain
+        self._store = store
+        self._warn = warn
         self._inbox: Inbox[Input] = Inbox()
+        self._grid = robot.grid
         self._localizer = Localizer(cache_dir=cache_folder())
-        self._thread = threading.Thread(target=self._live, name="firstfix", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="firstfix", daemon=True)
 
     def start(self) -> None:
-        """Begin to live, once kernels and map are ready."""
+        """Start the thread; it precompiles the kernels first."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End after the present moment, unless that takes long, as compiling kernels does."""
+        """Stop after the present step, unless that takes long, as compiling does."""
         self._inbox.close()
         self._thread.join(_END_S)
 
     def give(self, given: Input) -> None:
-        """Take in what the robot does not know of, such as the word of a person.
-
-        Parameters
-        ----------
-        given : Input
-            What happened.
-        """
+        """Queue an input for the localizer; thread-safe."""
         self._inbox.put(given)
 
-    def _live(self) -> None:
+    def _run(self) -> None:
         precompile()
         self._try(self._handle, NewMap(0.0, self._grid))
         due = time.monotonic()
@@ -87,26 +69,34 @@ class SimNode:
             for given in self._inbox.take(max(0.0, due - time.monotonic())):
                 self._try(self._handle, given)
             if time.monotonic() >= due:
-                self._try(self._go_on)
-                # A machine that was asleep does not run after what it missed.
+                self._try(self._advance)
+                # After a suspension of the machine, missed steps are not made up for.
                 due = max(due + PERIOD_S, time.monotonic())
 
-    def _go_on(self) -> None:
+    def _advance(self) -> None:
         moment = self._robot.step()
-        if moment is not None:
-            self._know(moment.T_map_base)
+        if self._robot.grid is not self._grid:
+            self._restart()
+        elif moment is not None:
+            self._store.set_truth(moment.T_map_base)
             for event in moment.events:
                 self._handle(event)
 
+    def _restart(self) -> None:
+        """Begin again in another world, whose clock starts at zero."""
+        self._grid = self._robot.grid
+        self._localizer = Localizer(cache_dir=cache_folder())
+        self._store.set_map_name(self._robot.status.world)
+        self._handle(NewMap(0.0, self._grid))
+
     def _handle(self, given: Input) -> None:
         outputs = self._localizer.handle(given)
-        for watch in self._watchers:
-            watch(given, outputs, self._localizer)
+        self._store(given, outputs, self._localizer)
 
     def _try(self, step: Callable[..., None], *given: Input) -> None:
         try:
             step(*given)
         except InputError as error:
-            self._complain(f"{error}")
+            self._warn(f"{error}")
         except Exception:  # noqa: BLE001 - a robot that stopped silently would be worse
-            self._complain(f"an error of firstfix itself:\n{traceback.format_exc()}")
+            self._warn(f"Internal error of firstfix:\n{traceback.format_exc()}")

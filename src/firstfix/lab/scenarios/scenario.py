@@ -125,7 +125,6 @@ def check_room(floor: Floor, place: SE2, radius_m: float) -> None:
     room = floor.room_at(place.x, place.y)
     if room < radius_m:
         raise InputError(
-            expected=f"a place with {radius_m:g} m around it for the robot",
-            received=f"({place.x:.2f}, {place.y:.2f}) m, where there is {room:.2f} m",
-            remedy="choose a place in the free space of the map",
+            f"({place.x:.2f}, {place.y:.2f}) m is too close to a wall. Pick a point in free space, "
+            f"at least {radius_m:.1f} m from walls."
         )

@@ -120,7 +120,7 @@ class Simulation:
         self.planner = Planner(floor, kobuki.radius_m + _MARGIN_M)
         self.people = People(floor, whims)
         self.rng = script
-        self._lidar = lidar
+        self.lidar = lidar
         self._shutter = shutter
         self._beams = beams
         self._ticks = 0
@@ -159,7 +159,7 @@ class Simulation:
             events.append(Odometry(self.stamp, self.robot.T_odom_base))
             self._tick(command)
         scan = sweep(
-            self._lidar,
+            self.lidar,
             self.floor,
             T_map_base,
             self._beams,

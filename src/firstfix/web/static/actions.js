@@ -1,5 +1,7 @@
 /** The commands, and the mode that decides what a press on the map does. */
 
+import { Simulation } from "./simulation.js";
+
 const MODES = {
   pose: {
     text: "Press where the robot stands, then drag in the direction it faces.",
@@ -33,16 +35,13 @@ export class Actions {
     byId("leave-mode").addEventListener("click", () => this.leaveMode());
     byId("relocalize").addEventListener("click", () => this.relocalize());
     byId("pause").addEventListener("click", () => this.togglePause());
-    byId("people").addEventListener("input", () => this.#showPeople());
-    byId("people").addEventListener("change", () => this.#setPeople());
-    byId("add-person").addEventListener("click", () => {
-      byId("people").stepUp();
-      this.#setPeople();
-    });
+    byId("kidnap").addEventListener("click", () => this.kidnap());
+    byId("decide").addEventListener("click", () => this.#send({ type: "decide" }));
+    this.simulation = new Simulation((message) => this.#send(message));
   }
 
   /** Show what this viewer may do, from `hello`. */
-  allow(maySteer, abilities) {
+  allow({ may_steer: maySteer, abilities, menus }) {
     this.#maySteer = maySteer;
     this.#abilities = new Set(maySteer ? ["pose", ...abilities] : []);
     byId("tools").hidden = !maySteer;
@@ -51,9 +50,10 @@ export class Actions {
     byId("mode-goal").hidden = !this.#abilities.has("goal");
     byId("mode-carry").hidden = !this.#abilities.has("carry");
     byId("pause").hidden = !this.#abilities.has("pause");
-    byId("simulation").hidden = !this.#abilities.has("people");
+    byId("kidnap").hidden = !this.#abilities.has("kidnap");
+    this.simulation.offer(maySteer ? menus : null);
     for (const line of document.querySelectorAll("#help-dialog .steer")) {
-      const asks = ["goal", "carry", "pause"].filter((ability) => line.classList.contains(ability));
+      const asks = ["goal", "carry", "kidnap", "pause"].filter((ability) => line.classList.contains(ability));
       line.hidden = !maySteer || !asks.every((ability) => this.#abilities.has(ability));
     }
     if (!this.#abilities.has(this.scene.mode)) this.leaveMode();
@@ -138,17 +138,19 @@ export class Actions {
     this.#send({ type: "pause", paused: !this.scene.state?.paused });
   }
 
+  kidnap() {
+    if (!this.#abilities.has("kidnap")) return;
+    this.scene.goal = null;
+    this.#send({ type: "kidnap" });
+  }
+
+  /** Whether the deciding motion of the state can be executed by a button. */
+  get canDecide() {
+    return this.#abilities.has("decide");
+  }
+
   needsDrag() {
     this.notices.showError("Press where the robot stands, then drag in the direction it faces.");
-  }
-
-  #showPeople() {
-    byId("people-count").value = byId("people").value;
-  }
-
-  #setPeople() {
-    this.#showPeople();
-    this.#send({ type: "people", count: Number(byId("people").value) });
   }
 
   #send(message) {

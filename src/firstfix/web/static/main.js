@@ -64,7 +64,7 @@ function greet(hello) {
   notices.hideLost();
   scene.clearRobot();
   timeline.replace(hello.events);
-  actions.allow(hello.may_steer, hello.abilities);
+  actions.allow(hello);
   document.querySelector("[data-layer=truth]").hidden = hello.robot !== "sim";
   if (hello.map) showMap(hello.map);
 }
@@ -72,6 +72,8 @@ function greet(hello) {
 function takeState(state) {
   scene.takeState(state);
   panel.show(state);
+  actions.simulation.show(state);
+  byId("decide").hidden = !state.motion || !actions.canDecide;
   app.dataset.pose = numbers(state.pose);
   app.dataset.truth = numbers(state.truth);
   redraw();
@@ -160,6 +162,7 @@ listenToKeys({
     p: () => actions.toggleModeByKey("pose"),
     g: () => actions.toggleModeByKey("goal"),
     c: () => actions.toggleModeByKey("carry"),
+    k: () => actions.kidnap(),
     r: () => actions.relocalize(),
     Space: () => actions.togglePause(),
     escape: () => actions.leaveMode(),

@@ -67,11 +67,8 @@ export class Panel {
     byId("state-note").hidden = !places;
     byId("paused").hidden = !state.paused;
     const advice = state.motion && name === "DISAMBIGUATING" ? format.motionText(state.motion) : "";
-    setText(byId("advice"), advice);
+    setText(byId("advice-text"), advice);
     byId("advice").hidden = !advice;
-    setText(byId("pause-text"), state.paused ? "Resume" : "Pause");
-    byId("pause").setAttribute("aria-pressed", String(Boolean(state.paused)));
-    byId("pause-icon").setAttribute("href", state.paused ? "#i-play" : "#i-pause");
     if (nameOf(state) === this.#shownName) return;
     this.#shownName = nameOf(state);
     const spoken = name.toLowerCase().replaceAll("_", " ");

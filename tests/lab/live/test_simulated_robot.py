@@ -1,4 +1,4 @@
-"""A simulated robot does as it is told, and wanders when nobody tells it."""
+"""A simulated robot executes commands, and wanders between them."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from firstfix.core.angles import wrap
 from firstfix.core.errors import InputError
-from firstfix.core.odometry import Signal, SignalKind
+from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.se2 import SE2
-from firstfix.lab.live.steered_robot import MOST_PEOPLE, SimRobot
+from firstfix.lab.live.simulated_robot import MOST_PEOPLE, SENSORS, SimulatedRobot
 from firstfix.lab.simulation.simulation import Moment
 from firstfix.lab.worlds.catalog import WORLDS, random_free_poses
 
@@ -19,11 +20,11 @@ SOON = 1200  # scans: two minutes of its time
 
 
 @pytest.fixture
-def robot() -> SimRobot:
-    return SimRobot(HOUSE, 1)
+def robot() -> SimulatedRobot:
+    return SimulatedRobot(HOUSE, 1)
 
 
-def step_until(robot: SimRobot, holds: Callable[[Moment], bool]) -> list[Moment]:
+def step_until(robot: SimulatedRobot, holds: Callable[[Moment], bool]) -> list[Moment]:
     """Go on until a moment of which something holds; all moments on the way."""
     moments = []
     for _ in range(SOON):
@@ -53,13 +54,13 @@ def test_it_wakes_stands_and_wanders(robot):
     step_until(robot, lambda moment: moment.T_map_base.distance_to(start) > 2.0)
 
 
-def test_the_same_orders_at_the_same_scans_lead_to_the_same_story():
+def test_the_same_commands_at_the_same_scans_give_the_same_result():
     def story() -> list[Moment]:
-        robot = SimRobot(HOUSE, 3)
+        robot = SimulatedRobot(HOUSE, 3)
         moments = []
         for i in range(150):
             if i == 30:
-                robot.meet(3)
+                robot.set_people(3)
             if i == 60:
                 robot.carry_to(SE2(*goal_of(HOUSE, 1)))
             moments.append(robot.step())
@@ -77,7 +78,7 @@ def goal_of(grid, seed: int) -> tuple[float, float, float]:
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_it_goes_where_it_is_sent_at_once_and_waits_there(robot, seed):
+def test_it_drives_to_a_goal_at_once_and_waits_there(robot, seed):
     step_until(robot, lambda moment: moment.phase == "drive")
     x, y, _ = goal_of(HOUSE, seed)
     robot.drive_to(x, y)
@@ -99,15 +100,15 @@ def test_a_goal_replaces_the_one_before(robot):
 
 @pytest.mark.parametrize(("x", "y"), [(-50.0, 0.0), (1e6, 1e6), (0.0, 0.0)])
 def test_a_goal_where_it_does_not_fit_is_refused_and_it_goes_on(robot, x, y):
-    with pytest.raises(InputError, match="free space"):
+    with pytest.raises(InputError, match="too close to a wall"):
         robot.drive_to(x, y)
-    with pytest.raises(InputError, match="free space"):
+    with pytest.raises(InputError, match="too close to a wall"):
         robot.carry_to(SE2(x, y, 0.0))
     assert robot.step() is not None
 
 
 def test_a_goal_behind_walls_is_refused():
-    robot = SimRobot(WORLDS["rooms"](), 1)
+    robot = SimulatedRobot(WORLDS["rooms"](), 1)
     here = robot.T_map_base
     with pytest.raises(InputError, match="behind walls"):
         robot.drive_to((here.x + 8.0) % 32.0, here.y)
@@ -117,9 +118,9 @@ def test_it_is_carried_and_its_wheels_tell(robot):
     pose = SE2(*goal_of(HOUSE, 1))
     robot.carry_to(pose)
     moments = step_until(robot, lambda moment: moment.phase == "carry")
-    with pytest.raises(InputError, match="hands"):
+    with pytest.raises(InputError, match="being carried"):
         robot.drive_to(pose.x, pose.y)
-    with pytest.raises(InputError, match="hands"):
+    with pytest.raises(InputError, match="being carried"):
         robot.carry_to(pose)
     moments += step_until(robot, lambda moment: moment.phase == "stand")
     assert robot.T_map_base == pose
@@ -135,25 +136,106 @@ def test_people_come_and_go(robot):
         return np.count_nonzero(robot.step().scan.ranges < np.minimum(free, 12.0) - 0.3)
 
     few = before_walls()
-    robot.meet(6)
+    robot.set_people(6)
     assert before_walls() > few + 10
-    robot.meet(0)
+    robot.set_people(0)
     assert before_walls() < few + 10
     for count in (-1, MOST_PEOPLE + 1):
         with pytest.raises(InputError, match="people"):
-            robot.meet(count)
+            robot.set_people(count)
 
 
 def test_its_clock_stops_and_goes_on(robot):
     before = robot.step().stamp
     robot.pause()
     assert [robot.step(), robot.step()] == [None, None]
-    robot.go_on()
+    robot.resume()
     assert robot.step().stamp == pytest.approx(before + 0.1)
 
 
 def test_where_there_is_no_way_out_it_stays():
-    robot = SimRobot(WORLDS["house"](), 1)
+    robot = SimulatedRobot(WORLDS["house"](), 1)
     robot._simulation.planner._tightest_m = 99.0  # a robot as large as the house
     moments = [robot.step() for _ in range(100)]
     assert {moment.phase for moment in moments} == {"pause", "stand"}
+
+
+def odometry_of(moments: list[Moment]) -> list[SE2]:
+    return [
+        event.T_odom_base
+        for moment in moments
+        for event in moment.events
+        if isinstance(event, Odometry)
+    ]
+
+
+def test_a_kidnapped_robot_reports_nothing_of_it(robot):
+    step_until(robot, lambda moment: moment.phase == "drive")
+    before = robot.T_map_base
+    pose = robot.kidnap()
+    moments = [robot.step() for _ in range(20)]
+    assert robot.T_map_base == pose
+    assert pose.distance_to(before) > 0.5
+    assert not [e for m in moments for e in m.events if isinstance(e, Signal)]
+    first, *_, last = odometry_of(moments)
+    assert first.distance_to(last) < 0.05
+
+
+def test_a_robot_that_is_being_carried_cannot_be_kidnapped(robot):
+    robot.carry_to(SE2(*goal_of(HOUSE, 1)))
+    step_until(robot, lambda moment: moment.phase == "carry")
+    with pytest.raises(InputError, match="being carried"):
+        robot.kidnap()
+
+
+def test_a_covered_sensor_has_no_valid_range_until_it_is_uncovered(robot):
+    step_until(robot, lambda moment: moment.scan is not None)
+    robot.cover_sensor(covered=True)
+    scan = robot.step().scan
+    assert (scan.ranges < scan.range_min).all()
+    robot.cover_sensor(covered=False)
+    assert (robot.step().scan.ranges > scan.range_min).any()
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_a_sensor_of_the_menu_has_the_view_and_the_range_in_its_name(robot, name):
+    degrees, metres = (float(part.rstrip("° m")) for part in name.split("x"))
+    robot.select_sensor(name)
+    scan = step_until(robot, lambda moment: moment.scan is not None)[-1].scan
+    seen = len(scan.ranges) * scan.angle_increment
+    assert np.degrees(seen) == pytest.approx(degrees, abs=1.0)
+    assert scan.range_max == metres
+    assert robot.status.sensor == name
+
+
+def test_another_world_restarts_the_simulation_with_the_same_sensor(robot):
+    step_until(robot, lambda moment: moment.phase == "drive")
+    robot.select_sensor("60° x 5 m")
+    robot.select_world("office")
+    assert robot.status.world == "office"
+    assert (robot.grid.width, robot.grid.height) == WORLDS["office"]().cells.shape[::-1]
+    moment = robot.step()
+    assert (moment.stamp, moment.phase) == (0.0, "pause")
+    assert step_until(robot, lambda m: m.scan is not None)[-1].scan.range_max == 5.0
+    robot.select_world("map")
+    assert robot.grid is HOUSE
+
+
+def test_menus_refuse_other_names(robot):
+    with pytest.raises(InputError, match="no world"):
+        robot.select_world("cellar")
+    with pytest.raises(InputError, match="no sensor"):
+        robot.select_sensor("sonar")
+    assert robot.worlds == ("map", *WORLDS)
+
+
+def test_a_deciding_motion_turns_and_drives_ahead(robot):
+    step_until(robot, lambda moment: moment.phase == "drive")
+    robot.drive_to(*goal_of(HOUSE, 1)[:2])
+    step_until(robot, lambda moment: moment.phase == "stand")
+    start = robot.T_map_base
+    robot.move(np.pi / 2, 0.0)
+    step_until(robot, lambda moment: moment.phase == "stand")
+    turned = robot.T_map_base
+    assert turned.distance_to(start) < 0.05
+    assert abs(wrap(turned.yaw - start.yaw - np.pi / 2)) < 0.2
