@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.belief.view import Observation, motion
+from firstfix.belief.view import Observation
+from firstfix.core.angles import angle_error
 
 # The power law of docs/decisions/0005 on the mean cost of all views. Its exponent grows with the
 # number of independent views, slowly: what is wrong in the map is wrong in several views.
@@ -25,7 +26,7 @@ ODOMETRY_WEIGHT = 1.0
 
 # A view is new in full if it was taken this far from every later one, or turned by a field of view
 # (by a radian if that is narrower).
-NEW_M = 1.0
+NEW_M = 2.0
 NEW_LEAST_RAD = 1.0
 
 
@@ -37,16 +38,15 @@ def novelty(window: Sequence[Observation]) -> NDArray[np.float64]:
     window : sequence of Observation
         Oldest first.
     """
-    new = np.ones(len(window))
-    for i, early in enumerate(window[:-1]):
-        new[i] = min(1.0, *(_apart(early, late) for late in window[i + 1 :]))
-    return new
-
-
-def _apart(early: Observation, late: Observation) -> float:
-    path, turn = motion(early, late)
-    wide = max(NEW_LEAST_RAD, late.field_of_view)
-    return max(path * late.resolution / NEW_M, turn / wide)
+    odometry = np.array([seen.odometry for seen in window])
+    apart = odometry[:, None] - odometry[None]
+    path = np.hypot(apart[..., 0], apart[..., 1]) * window[-1].resolution
+    turn = angle_error(odometry[:, None, 2], odometry[None, :, 2])
+    wide = max(NEW_LEAST_RAD, window[-1].field_of_view)
+    new = np.maximum(path / NEW_M, turn / wide)
+    new[np.tril_indices(len(window))] = 1.0
+    least: NDArray[np.float64] = new.min(axis=1)
+    return least
 
 
 def exponent(views: float, beams: int) -> float:

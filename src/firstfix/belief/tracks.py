@@ -17,10 +17,6 @@ from firstfix.fields.map_fields import MapFields
 BEAMS = 36
 CAREFUL_BEAMS = 180
 
-# A nat of odometry in units of the mean cost of a beam: the slope of the power law (exponent 12) at
-# a usual cost.
-_COST_PER_NAT = 0.06
-
 # The best places are refined on rays, below the size of a cell.
 RAY_PLACES = 12
 
@@ -164,19 +160,12 @@ def _carried(
     end: Observation,
     fields: MapFields,
 ) -> Tracks:
-    """Return the tracks at the end only: by odometry, or adjusted where that fits better."""
+    """Return the tracks at the end only, carried by odometry and adjusted."""
     predicted = compose(poses, between(start.odometry, end.odometry))
     slack = slack_between(start, end)
     adjusted = adjust(predicted, end, slack, fields)
-    plain, bent = (costs(way, end, BEAMS, fields) for way in (predicted, adjusted))
     strain = strains(predicted, adjusted, slack)
-    better = bent + _COST_PER_NAT * strain < plain
-    return Tracks.at(
-        np.where(better[:, None], adjusted, predicted),
-        np.where(better, bent, plain),
-        ids,
-        np.where(better, strain, 0.0),
-    )
+    return Tracks.at(adjusted, costs(adjusted, end, BEAMS, fields), ids, strain)
 
 
 def _joined(one: Tracks, other: Tracks, axis: int, ids: NDArray[np.int64]) -> Tracks:

@@ -100,7 +100,7 @@ class Observation:
             Sensor(scan, usable_beams(scan), in_cells(scan.T_base_laser, self.resolution))
             for scan in self.scans
         ]
-        return tuple(sorted(sensors, key=lambda s: -int(np.count_nonzero(s.beams.hit))))
+        return tuple(sorted(sensors, key=_rank))
 
     @property
     def beams(self) -> Beams:
@@ -190,6 +190,11 @@ def motion(start: Observation, end: Observation) -> tuple[float, float]:
     """Return the distance (cells) and the turn (rad, never negative) between two observations."""
     step = between(start.odometry, end.odometry)
     return math.hypot(step[0], step[1]), abs(math.remainder(step[2], 2.0 * math.pi))
+
+
+def _rank(sensor: Sensor) -> tuple[int, list[float]]:
+    """Most hits first; of equal ones in an order that does not depend on that of the scans."""
+    return -int(np.count_nonzero(sensor.beams.hit)), sensor.T_base_laser.tolist()
 
 
 def _angle(scan: LaserScan) -> float:
