@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from firstfix.core.grid import OccupancyGrid
@@ -49,7 +50,19 @@ class Wire:
         """Build a message of ``package/Type``, as a transport does."""
         if self.is_ros1 and type_name == "std_msgs/Header":
             fields["seq"] = 0
-        return self._store.types[type_name.replace("/", "/msg/")](**fields)
+        name = type_name.replace("/", "/msg/")
+        known = self._store.fielddefs[name][1]
+        return self._store.types[name](**{f: self._zero(kind) for f, kind in known} | fields)
+
+    def _zero(self, described: Any) -> Any:
+        """Return the value of a field that is not given, as clients of ROS do."""
+        kind, detail = described
+        if kind is Nodetype.NAME:
+            return self.make(detail.replace("/msg/", "/"))
+        if kind is Nodetype.BASE:
+            return {"string": "", "bool": False}.get(detail[0], 0)
+        is_number = detail[0][0] is Nodetype.BASE and detail[0][1][0] not in ("string", "bool")
+        return np.zeros(detail[1], detail[0][1][0]) if is_number else []
 
     def sent(self, message: Any) -> Any:
         """Serialize and deserialize a message."""

@@ -74,7 +74,7 @@ def test_parameters_of_the_example_are_right() -> None:
 def test_the_launch_file_of_the_example_is_python() -> None:
     (text,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     compile(text, "localization.launch.py", "exec")
-    assert '"bond_timeout": 0.0' in text
+    assert '"node_names": ["map_server", "firstfix"]' in text
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ OURS = (
     *(f"rclpy.{path.stem}" for path in (STAND_IN / "rclpy").glob("*.py")),
     *(f"firstfix.ros.ros2.{name}" for name in ("bond", "node", "transport", "types")),
 )
-ALL = ("bond", "nav2_msgs", "kobuki_ros_interfaces")
+ALL = ("bond", "nav2_msgs", "kobuki_ros_interfaces", "visualization_msgs")
 # The wheels never turn: whoever changes the pose of the robot carries it.
 T_ODOM_BASE = SE2(5.0, 5.0, 1.0)
 # A kernel may have to be compiled first.

@@ -19,6 +19,7 @@ from firstfix.ros.channels import (
     HYPOTHESES,
     INITIAL_POSE,
     LOCALIZED,
+    MARKERS,
     PARTICLE_POSES,
     PARTICLES,
     STATUS,
@@ -123,7 +124,7 @@ def test_frames_are_those_of_the_settings(recorder):
 @pytest.mark.parametrize("particles", [PARTICLES, PARTICLE_POSES])
 def test_nothing_is_published_that_was_not_advertised(ros2, config, particles):
     recorder = Recorder(ros2, particles)
-    recorder.listening = {particles.name: 1, INITIAL_POSE.name: 1}
+    recorder.listening = {topic.name: 1 for topic in (particles, INITIAL_POSE, MARKERS)}
     announced(recorder, config, searching(1.0), several(2.0), found(3.0), particles=cloud())
     said = set(published_topics(config, particles))
     assert {topic for topic, _ in recorder.published} == said
@@ -338,3 +339,25 @@ def test_without_scans_the_status_is_stale_with_the_reason_and_the_robot_not_loc
 def test_localized_is_published_when_it_changes(recorder):
     announced(recorder, FULL, searching(1.0), searching(2.0), found(3.0), tracked(4.0))
     assert [message.data for message in recorder.on(LOCALIZED)] == [False, True]
+
+
+# ---- markers
+
+
+def test_markers_show_each_place_with_its_probability(recorder):
+    recorder.listening = {MARKERS.name: 1}
+    publisher = announced(recorder, FULL, several(1.0, 4))
+    (message,) = recorder.on(MARKERS)
+    clear, *shown = message.markers
+    assert clear.action == 3
+    assert [marker.text for marker in shown[1::2]] == ["25%"] * 4
+    assert [marker.pose.position.x for marker in shown[::2]] == [0.0, 8.0, 16.0, 24.0]
+    assert [marker.color.a for marker in shown] == pytest.approx([0.4] * 8)
+    assert len({marker.id for marker in shown}) == 8
+    publisher.publish(found(2.0), None)
+    assert [marker.action for marker in recorder.on(MARKERS)[-1].markers] == [3]
+
+
+def test_no_markers_are_made_while_nobody_subscribes(recorder):
+    announced(recorder, FULL, several(1.0, 4))
+    assert recorder.on(MARKERS) == []

@@ -63,6 +63,7 @@ PARTICLES = Topic("particle_cloud", "nav2_msgs/ParticleCloud", Delivery.SENSOR)
 # RViz of ROS 1 can display this type, and it exists where nav2_msgs is not installed.
 PARTICLE_POSES = Topic("particle_cloud", "geometry_msgs/PoseArray", Delivery.SENSOR)
 HYPOTHESES = Topic("hypotheses", "geometry_msgs/PoseArray", Delivery.LATCHED)
+MARKERS = Topic("hypothesis_markers", "visualization_msgs/MarkerArray", Delivery.RELIABLE)
 LOCALIZED = Topic("localized", "std_msgs/Bool", Delivery.LATCHED)
 STATUS = Topic("localization_status", "diagnostic_msgs/DiagnosticArray", Delivery.LATCHED)
 
@@ -113,6 +114,6 @@ def published_topics(config: NodeConfig, particles: Topic) -> tuple[Topic, ...]:
         All of them.
     """
     if config.mode is Mode.BOOTSTRAP:
-        return INITIAL_POSE, HYPOTHESES, LOCALIZED, STATUS
+        return INITIAL_POSE, HYPOTHESES, MARKERS, LOCALIZED, STATUS
     moved = [TF] if config.tf_broadcast else []
-    return (AMCL_POSE, particles, HYPOTHESES, LOCALIZED, STATUS, *moved)
+    return (AMCL_POSE, particles, HYPOTHESES, MARKERS, LOCALIZED, STATUS, *moved)

@@ -14,6 +14,7 @@ from firstfix.io.ros_messages.outgoing import (
     Level,
     diagnostics,
     particle_cloud,
+    place_markers,
     pose_array,
     pose_with_covariance,
     transforms,
@@ -27,7 +28,15 @@ from firstfix.localizer.outputs import (
     TrackedPose,
 )
 from firstfix.localizer.states import State
-from firstfix.ros.channels import AMCL_POSE, HYPOTHESES, INITIAL_POSE, LOCALIZED, STATUS, TF
+from firstfix.ros.channels import (
+    AMCL_POSE,
+    HYPOTHESES,
+    INITIAL_POSE,
+    LOCALIZED,
+    MARKERS,
+    STATUS,
+    TF,
+)
 from firstfix.ros.exact_stamps import ExactStamps
 from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.transport import Severity, Transport
@@ -71,7 +80,7 @@ class OutputPublisher:
         self._logged_at = -math.inf
         self._cloud_at = -math.inf
         self._motion: MotionRequest | None = None
-        self._places = 0
+        self._places: list[tuple[SE2, float]] = []
         self._own_poses: deque[StampedTransform] = deque(maxlen=_OWN_POSES)
         self._pose_subscribers = 0
 
@@ -95,7 +104,7 @@ class OutputPublisher:
             elif isinstance(output, TrackedPose):
                 self._publish_tracked(output, particles)
             elif isinstance(output, Hypotheses):
-                self._publish_places(output.stamp, [place.pose for place in output.places])
+                self._publish_places(output.stamp, [(p.pose, p.probability) for p in output.places])
             elif isinstance(output, Status):
                 self._publish_status(output)
 
@@ -146,11 +155,13 @@ class OutputPublisher:
             cloud = particle_cloud(make, exact, self._map, poses, particles.weight)
         self._transport.publish(topic, cloud)
 
-    def _publish_places(self, stamp: float, poses: list[SE2]) -> None:
-        self._places = len(poses)
-        exact = self._stamps.exact(stamp)
-        message = pose_array(self._transport.make, exact, self._map, poses)
-        self._transport.publish(HYPOTHESES, message)
+    def _publish_places(self, stamp: float, places: list[tuple[SE2, float]]) -> None:
+        self._places = places
+        make, exact = self._transport.make, self._stamps.exact(stamp)
+        poses = [pose for pose, _ in places]
+        self._transport.publish(HYPOTHESES, pose_array(make, exact, self._map, poses))
+        if self._transport.subscriber_count(MARKERS):
+            self._transport.publish(MARKERS, place_markers(make, exact, self._map, places))
 
     def _publish_status(self, status: Status) -> None:
         if self._places and status.state is not State.DISAMBIGUATING:
@@ -193,7 +204,7 @@ class OutputPublisher:
 
     def _values(self, status: Status) -> dict[str, str]:
         values = {"state": status.state.value, "mode": self._config.mode.value}
-        values["hypotheses"] = str(self._places)
+        values["hypotheses"] = str(len(self._places))
         if (evidence := status.evidence) is not None:
             for name in ("explained", "short", "through_wall", "unknown"):
                 values[name] = f"{getattr(evidence, name):.3f}"

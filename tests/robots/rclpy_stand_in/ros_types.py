@@ -31,7 +31,12 @@ BOND = {
 }
 PACKAGES = ("builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "nav_msgs", "rcl_interfaces")
 PACKAGES += ("sensor_msgs", "std_msgs", "std_srvs", "tf2_msgs")
-OPTIONAL = {"bond": BOND, "kobuki_ros_interfaces": KOBUKI, "nav2_msgs": NAV2}
+OPTIONAL = {
+    "bond": BOND,
+    "kobuki_ros_interfaces": KOBUKI,
+    "nav2_msgs": NAV2,
+    "visualization_msgs": {},
+}
 
 TYPECODES = {"float32": "f", "float64": "d", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H"}
 TYPECODES |= {"int32": "i", "uint32": "I", "int64": "q", "uint64": "Q"}

@@ -22,6 +22,7 @@ from firstfix.io.ros_messages.outgoing import (
     occupancy_grid,
     odometry,
     particle_cloud,
+    place_markers,
     pose_array,
     pose_with_covariance,
     transforms,
@@ -56,6 +57,7 @@ MADE = {
     "kobuki/WheelDropEvent": make("kobuki/WheelDropEvent", wheel=1, state=1),
     "kobuki/BumperEvent": make("kobuki/BumperEvent", bumper=2, state=0),
     "std_msgs/Bool": make("std_msgs/Bool", data=True),
+    "visualization_msgs/MarkerArray": place_markers(make, 1.0, "map", [(SE2.identity(), 0.5)]),
 }
 
 

@@ -140,6 +140,7 @@ def test_qualities_are_those_that_others_use(lab: Lab) -> None:
         "events/bumper": (10, "RELIABLE", "VOLATILE"),
         "kidnapped": (10, "RELIABLE", "VOLATILE"),
         "hypotheses": (1, "RELIABLE", "TRANSIENT_LOCAL"),
+        "hypothesis_markers": (10, "RELIABLE", "VOLATILE"),
         "localized": (1, "RELIABLE", "TRANSIENT_LOCAL"),
         "localization_status": (1, "RELIABLE", "TRANSIENT_LOCAL"),
     }

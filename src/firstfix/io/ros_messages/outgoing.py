@@ -22,6 +22,9 @@ from firstfix.core.se2 import SE2
 # Of x, y and yaw in the 6 x 6 covariance of a message: x, y, z, roll, pitch, yaw.
 _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _NS = 1_000_000_000
+# Of visualization_msgs/Marker.
+_ARROW, _TEXT = 0, 9
+_ADD, _DELETE_ALL = 0, 3
 
 
 Make = Callable[..., Any]
@@ -214,6 +217,47 @@ def diagnostics(
         values=[make("diagnostic_msgs/KeyValue", key=k, value=v) for k, v in values.items()],
     )
     return make("diagnostic_msgs/DiagnosticArray", header=header(make, stamp, ""), status=[status])
+
+
+def place_markers(
+    make: Make, stamp: float | ExactTime, frame: str, places: Iterable[tuple[SE2, float]]
+) -> Any:
+    """Build a ``visualization_msgs/MarkerArray``: an arrow and its probability for each place.
+
+    Parameters
+    ----------
+    make : Make
+        Of the transport; it fills in the fields that are not given.
+    stamp : float or ExactTime
+        Time, s or exact.
+    frame : str
+        Frame of the map.
+    places : iterable of tuple of SE2 and float
+        Pose and probability of each place.
+
+    Returns
+    -------
+    message
+        Begins with a marker that removes those of before.
+    """
+    top = header(make, stamp, frame)
+
+    def marker(kind: int, number: int, **fields: Any) -> Any:
+        return make(
+            "visualization_msgs/Marker", header=top, ns="firstfix", id=number, type=kind, **fields
+        )
+
+    markers = [marker(_ARROW, 0, action=_DELETE_ALL)]
+    for number, (T_map_base, probability) in enumerate(places):
+        # An unlikely place stays visible.
+        color = make("std_msgs/ColorRGBA", r=0.9, g=0.4, b=0.0, a=0.2 + 0.8 * probability)
+        shown = {"action": _ADD, "pose": pose(make, T_map_base), "color": color}
+        arrow = make("geometry_msgs/Vector3", x=0.6, y=0.1, z=0.1)
+        letter = make("geometry_msgs/Vector3", x=0.0, y=0.0, z=0.3)
+        text = f"{probability:.0%}"
+        markers.append(marker(_ARROW, 2 * number, scale=arrow, **shown))
+        markers.append(marker(_TEXT, 2 * number + 1, scale=letter, text=text, **shown))
+    return make("visualization_msgs/MarkerArray", markers=markers)
 
 
 def laser_scan(make: Make, frame: str, scan: LaserScan) -> Any:

@@ -6,6 +6,7 @@ import functools
 import struct
 from typing import Any
 
+import numpy as np
 from cyclonedds.idl import IdlStruct, make_idl_struct, types
 from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
@@ -57,8 +58,25 @@ def full_name(type_name: str) -> str:
 
 
 def make(type_name: str, /, **fields: Any) -> Any:
-    """Build a message from all its fields."""
-    return _store().types[full_name(type_name)](**fields)
+    """Build a message; the fields that are not given are zero or empty."""
+    name = full_name(type_name)
+    known = _store().fielddefs[name][1]
+    if len(fields) < len(known):
+        fields = {field: _zero(kind) for field, kind in known} | fields
+    return _store().types[name](**fields)
+
+
+def _zero(described_as: Any) -> Any:
+    """Return the value of a field that is not given, from rosbags' description of its type."""
+    kind, detail = described_as
+    if kind == Nodetype.NAME:
+        package, _, short = detail.split("/")
+        return make(f"{package}/{short}")
+    if kind == Nodetype.BASE:
+        return {"string": "", "bool": False}.get(detail[0], 0)
+    element, length = detail
+    is_number = element[0] == Nodetype.BASE and element[1][0] not in ("string", "bool")
+    return np.zeros(length, element[1][0]) if is_number else [_zero(element)] * length
 
 
 def encode(type_name: str, message: Any) -> bytes:

@@ -57,6 +57,7 @@ class Ros2:
         self._publishers = {
             topic.name: owner.create_lifecycle_publisher(kind, topic.name, quality(topic))
             for topic, kind in kinds.items()
+            if kind is not None
         }
         self._subscriptions: list[Any] = []
         self._services: list[Any] = []

@@ -17,7 +17,7 @@ from firstfix.ros.parameters import Parameter
 # Packages that ROS 2 names differently than `firstfix.ros.channels`.
 _PACKAGES = {"kobuki": "kobuki_ros_interfaces"}
 # Optional packages.
-_OPTIONAL = ("bond", "kobuki", "nav2_msgs")
+_OPTIONAL = ("bond", "kobuki", "nav2_msgs", "visualization_msgs")
 
 # As in tf2: many nodes publish on this topic.
 _TF_DEPTH = 100
