@@ -103,6 +103,7 @@ def test_one_view_is_weighed_as_the_twin_does(room, drive, start):
     assert abs(elsewhere - belief.elsewhere) < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", STARTS)
 def test_some_views_are_weighed_as_the_twin_does(room, drive, start):
     # The twin takes odometry at its word; the belief leaves it some slack and is less sure.

@@ -9,16 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.belief.evidence import exponent, log_likelihoods, shares
 from firstfix.belief.view import Observation, motion
 from firstfix.core.estimate import Verdict
-from firstfix.global_localization.verdict import RIVAL_SHARE
+from firstfix.global_localization.verdict import RIVAL_SHARE, place_probabilities
 
 # Mean cost of a beam up to which a view is explained at a place. The wrong map begins at 2.3.
 EXPLAINED_COST = 1.6
 
 # A place that was published stays so while it is more likely than all others together.
 STAYING_PROBABILITY = 0.5
+
+# Least probability, by the law of the static stage, with which one scan decides.
+ALONE_PROBABILITY = 0.95
 
 # A second decision counts from a view that was taken this far away, or turned by this much.
 SECOND_LOOK_M = 0.3
@@ -128,7 +130,7 @@ def judge(
     if not stays and probabilities[0] < rule.probability:
         return Judgement(Verdict.AMBIGUOUS, _undecided(probabilities, len(window)), None)
 
-    alone = seen.decides_alone and _alone(costs[:, -1], len(seen.beams)) >= rule.probability
+    alone = seen.decides_alone and _alone(costs[:, -1], len(seen.beams)) >= ALONE_PROBABILITY
     published = alone or rule.hinted or (known is not None and _confirmed(known, seen))
     since = seen if known is None else known.since
     favourite = Favourite(int(ids[0]), since, published)
@@ -143,8 +145,7 @@ def judge(
 
 def _alone(newest: NDArray[np.float64], beams: int) -> float:
     """Return the probability of the best place by the newest view alone."""
-    power = exponent(1.0, beams)
-    return float(shares(log_likelihoods(newest, power), power)[0][0])
+    return float(place_probabilities(newest, beams)[0])
 
 
 def _confirmed(known: Favourite, seen: Observation) -> bool:
