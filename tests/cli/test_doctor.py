@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from firstfix.cli import doctor
-from firstfix.cli.doctor import told_as_unkept
+from firstfix.cli.doctor import cache_advice
 
-UNKEPT = "cannot cache function '_sweep': no matcher available for file 'clearance.py'"
+NO_CACHE = "cannot cache function '_sweep': no matcher available for file 'clearance.py'"
 
 
 def line(ended, title: str) -> str:
@@ -98,7 +98,7 @@ def test_a_cache_that_cannot_be_written(cli, monkeypatch, tmp_path: Path) -> Non
 
 def test_kernels_that_cannot_be_kept(cli, monkeypatch) -> None:
     def raising() -> str:
-        raise RuntimeError(UNKEPT)
+        raise RuntimeError(NO_CACHE)
 
     monkeypatch.setattr(doctor, "_tried_kernels", raising)
     ended = cli("doctor")
@@ -108,7 +108,7 @@ def test_kernels_that_cannot_be_kept(cli, monkeypatch) -> None:
 
 def test_any_command_says_so(cli, monkeypatch) -> None:
     def raising(_path: Path) -> str:
-        raise RuntimeError(UNKEPT)
+        raise RuntimeError(NO_CACHE)
 
     monkeypatch.setattr(doctor, "_map", raising)
     ended = cli("doctor", "map.yaml")
@@ -118,4 +118,4 @@ def test_any_command_says_so(cli, monkeypatch) -> None:
 
 
 def test_other_errors_stay_what_they_are() -> None:
-    assert told_as_unkept(RuntimeError("anything else")) is None
+    assert cache_advice(RuntimeError("anything else")) is None

@@ -1,6 +1,6 @@
 """The command line: which commands there are, and what their ends mean.
 
-Exit status: 0 done; 1 no answer where a pose was asked for; 2 wrong input, told in one line on
+Exit status: 0 done; 1 no answer where a pose was asked for; 2 wrong input, one sentence on
 stderr; 130 interrupted.
 """
 
@@ -18,7 +18,7 @@ import typer
 from firstfix import __version__
 from firstfix.cli.bench import bench
 from firstfix.cli.demo import demo
-from firstfix.cli.doctor import doctor, told_as_unkept
+from firstfix.cli.doctor import cache_advice, doctor
 from firstfix.cli.locate import locate
 from firstfix.cli.map import map_app
 from firstfix.cli.nodes import AFTER_DASHES, PASSED_ON, dds, ros1, ros2
@@ -27,8 +27,8 @@ from firstfix.cli.track import track
 from firstfix.core.errors import FirstfixError
 
 WRONG_INPUT = 2
-# The thread of a node that thinks; a node that ends does not wait for it longer than some seconds.
-THINKER = "firstfix"
+# The worker thread of a node; a node that stops waits for it only a few seconds.
+WORKER = "firstfix"
 
 app = typer.Typer(
     name="firstfix",
@@ -61,25 +61,14 @@ def _show_version(asked: bool) -> None:
 def options(
     _version: Annotated[
         bool,
-        typer.Option("--version", callback=_show_version, is_eager=True, help="Say the version."),
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
     ] = False,
 ) -> None:
     """Find a robot anywhere in its map from one 2D LIDAR scan, without motion."""
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line.
-
-    Parameters
-    ----------
-    arguments : sequence of str or None
-        What follows the name of the program; None takes it from the process.
-
-    Returns
-    -------
-    int
-        The exit status.
-    """
+    """Run a command line, by default that of the process, and return the exit status."""
     try:
         app(args=None if arguments is None else list(arguments), prog_name="firstfix")
     except FirstfixError as error:
@@ -87,7 +76,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         typer.echo(f"firstfix: {' '.join(str(error).split())}", err=True)
         return WRONG_INPUT
     except RuntimeError as error:
-        sentence = told_as_unkept(error)
+        sentence = cache_advice(error)
         if sentence is None:
             raise
         typer.echo(f"firstfix: {sentence}", err=True)
@@ -104,8 +93,8 @@ def main() -> None:
     gc.set_threshold(200_000, 20, 100)
     status = run()
     gc.freeze()
-    if any(thread.name == THINKER for thread in threading.enumerate()):
-        # It is in the compiler, which an ending interpreter would pull the memory from under.
+    if any(thread.name == WORKER for thread in threading.enumerate()):
+        # It is in the compiler and would crash when the interpreter ends.
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)

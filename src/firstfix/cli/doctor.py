@@ -45,8 +45,8 @@ MESSAGES = ("tf2_msgs", "diagnostic_msgs", "nav2_msgs", "kobuki_ros_interfaces")
 VARIABLES = ("ROS_DOMAIN_ID", "RMW_IMPLEMENTATION", "ROS_LOCALHOST_ONLY", "CYCLONEDDS_URI")
 _PATIENCE_S = 1.0
 
-# In numba's words, raised where a kernel is declared.
-_UNKEPT = "no matcher available"
+# Part of the message that numba raises where a kernel is declared.
+_NO_CACHE = "no matcher available"
 
 
 def doctor(
@@ -54,42 +54,33 @@ def doctor(
         Path | None, typer.Argument(metavar="[MAP]", help="A map to try, as map_server reads it.")
     ] = None,
 ) -> None:
-    """Say what is installed, whether caches and kernels work, which ROS is seen, if a map is fit.
+    """Print what is installed, and whether caches, kernels, ROS and a map work.
 
     Exit status 1 if the kernels do not work, 2 if the map cannot be used.
     """
-    _say("firstfix", f"{__version__} in {Path(__file__).parents[1]}")
-    _say("python", f"{platform.python_version()} on {platform.platform()}, {sys.prefix}")
-    _say("cores", f"{os.cpu_count()}, {_usable_cores()} of them for this process; a scan takes one")
+    _print("firstfix", f"{__version__} in {Path(__file__).parents[1]}")
+    _print("python", f"{platform.python_version()} on {platform.platform()}, {sys.prefix}")
+    _print(
+        "cores", f"{os.cpu_count()}, {_usable_cores()} of them for this process; a scan takes one"
+    )
     for package in PACKAGES:
-        _say(package, _version(package) or "missing: run pip install firstfix again")
+        _print(package, _version(package) or "missing: run pip install firstfix again")
     for package, without in EXTRAS.items():
-        _say(package, _version(package) or without)
-    _say("cache", _cache())
+        _print(package, _version(package) or without)
+    _print("cache", _cache())
     with working("compiling the kernels, which takes half a minute at most"):
         kernels, works = _kernels()
-    _say("kernels", kernels)
+    _print("kernels", kernels)
     if map_path is not None and works:
-        _say("map", _map(map_path))
-    _say("ROS", _ros())
+        _print("map", _map(map_path))
+    _print("ROS", _ros())
     if not works:
         raise typer.Exit(1)
 
 
-def told_as_unkept(error: RuntimeError) -> str | None:
-    """Return a sentence with a remedy, if numba has no folder for compiled kernels.
-
-    Parameters
-    ----------
-    error : RuntimeError
-        What came from numba.
-
-    Returns
-    -------
-    str or None
-        None for any other error.
-    """
-    if _UNKEPT not in str(error):
+def cache_advice(error: RuntimeError) -> str | None:
+    """Return a sentence with a remedy if numba cannot store compiled kernels; else None."""
+    if _NO_CACHE not in str(error):
         return None
     return (
         "expected a folder where compiled kernels can be kept, received none that can be written; "
@@ -97,12 +88,12 @@ def told_as_unkept(error: RuntimeError) -> str | None:
     )
 
 
-def _say(title: str, text: str) -> None:
+def _print(title: str, text: str) -> None:
     typer.echo(f"{title:<13}{text}")
 
 
 def _usable_cores() -> int:
-    # Containers and taskset give a process fewer than there are; not every system can tell.
+    # Containers and taskset give a process fewer than there are; some systems do not report it.
     affinity = getattr(os, "sched_getaffinity", None)
     return len(affinity(0)) if affinity else os.cpu_count() or 1
 
@@ -119,10 +110,10 @@ def _cache() -> str:
 
     folder = cache_folder()
     size = sum(p.stat().st_size for p in folder.rglob("*") if p.is_file()) if folder.exists() else 0
-    said = f"{folder}, {size / 1e6:.1f} MB"
+    text = f"{folder}, {size / 1e6:.1f} MB"
     if _can_be_written(folder):
-        return said
-    return f"{said}, cannot be written: every start prepares its map anew; set FIRSTFIX_CACHE_DIR"
+        return text
+    return f"{text}, cannot be written: every start prepares its map again; set FIRSTFIX_CACHE_DIR"
 
 
 def _can_be_written(folder: Path) -> bool:
@@ -136,11 +127,11 @@ def _can_be_written(folder: Path) -> bool:
 
 
 def _kernels() -> tuple[str, bool]:
-    """Return what to say of the kernels, and whether they work."""
+    """Describe the kernels, and return whether they work."""
     try:
         return _tried_kernels(), True
     except RuntimeError as error:
-        sentence = told_as_unkept(error)
+        sentence = cache_advice(error)
         if sentence is None:
             raise
         return sentence, False
@@ -171,30 +162,30 @@ def _map(path: Path) -> str:
 
     load_map(path)
     found = check_map(path)
-    said = f"{found.width_m:.1f} x {found.height_m:.1f} m, {found.free_area:.0f} m² free"
+    text = f"{found.width_m:.1f} x {found.height_m:.1f} m, {found.free_area:.0f} m² free"
     if found.warnings:
-        return f"{said}; {len(found.warnings)} warnings: firstfix map check {path}"
-    return f"{said}, no traps"
+        return f"{text}; {len(found.warnings)} warnings: firstfix map check {path}"
+    return f"{text}, no traps"
 
 
 def _ros() -> str:
     distribution = os.environ.get("ROS_DISTRO")
     clients, messages = _found(CLIENTS), _found(MESSAGES)
     if distribution is None and not clients:
-        said = "not seen; not needed for maps, bags and scans in files, nor for firstfix dds"
+        text = "not found; maps, bags, scans in files and firstfix dds work without it"
     else:
-        said = f"{distribution or 'no ROS_DISTRO'}, {' and '.join(clients) or 'no client library'}"
+        text = f"{distribution or 'no ROS_DISTRO'}, {' and '.join(clients) or 'no client library'}"
     if messages:
-        said += f"; {', '.join(messages)}"
+        text += f"; {', '.join(messages)}"
     for name in VARIABLES:
         if os.environ.get(name):
-            said += f"; {name}={os.environ[name]}"
+            text += f"; {name}={os.environ[name]}"
     if "rospy" in clients:
-        said += f"; {_master()}"
+        text += f"; {_master()}"
     prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     if "rclpy" in clients and sys.prefix not in prefixes:
-        said += f"; for ros2 run: export AMENT_PREFIX_PATH={sys.prefix}:$AMENT_PREFIX_PATH"
-    return said
+        text += f"; for ros2 run: export AMENT_PREFIX_PATH={sys.prefix}:$AMENT_PREFIX_PATH"
+    return text
 
 
 def _master() -> str:

@@ -42,7 +42,7 @@ AFTER_DASHES = {"allow_extra_args": True}
 
 
 def ros1(context: typer.Context) -> None:
-    """Run the node for ROS 1: it finds the robot, and tells AMCL or follows it itself.
+    """Run the node for ROS 1: it finds the robot, and starts AMCL or tracks the robot itself.
 
     Arguments are those of rosrun: `scan:=base_scan _mode:=full _base_frame_id:=base_link`.
     """
@@ -60,11 +60,11 @@ def ros2(context: typer.Context) -> None:
 
 def dds(
     map_file: Annotated[
-        Path | None, typer.Option("--map", help="Map to load; without it, hear it on `map`.")
+        Path | None, typer.Option("--map", help="Map to load; without it, the topic `map`.")
     ] = None,
     mode: Annotated[
         str | None,
-        typer.Option(help="`bootstrap`: find the robot for an AMCL beside; `full`: follow it."),
+        typer.Option(help="`bootstrap`: find the robot and start an AMCL; `full`: also track it."),
     ] = None,
     params: Annotated[
         Path | None, typer.Option(help="Parameters of Nav2's AMCL, in its section `amcl`.")
@@ -107,22 +107,12 @@ def dds(
 
 
 def runner(robot: str) -> Callable[[str, list[str], MakeNode], None]:
-    """Return what runs a node on a map, with arguments of its ROS, until it ends.
-
-    Parameters
-    ----------
-    robot : str
-        ros1, ros2 or dds.
-
-    Returns
-    -------
-    callable
-        Takes the path of the map, the arguments, and what makes the node.
+    """Return a function that runs a node: path of the map, arguments of ROS, factory of the node.
 
     Raises
     ------
     InputError
-        If that kind of ROS is not here.
+        If the client library of that ROS is missing.
     """
     adapter = _load(robot)
 
@@ -142,22 +132,22 @@ def _settings_of(arguments: list[str], map_file: str) -> tuple[NodeConfig, Names
     """Read what follows ``--ros-args`` where no ROS reads it."""
     from firstfix.ros.arguments import names_from, settings_from
 
-    told: dict[str, list[str]] = {"-r": [], "-p": [], "--params-file": []}
+    values: dict[str, list[str]] = {"-r": [], "-p": [], "--params-file": []}
     rest = [argument for argument in arguments if argument != "--ros-args"]
     for flag, value in zip_longest(rest[::2], rest[1::2]):
-        if flag not in told or value is None:
+        if flag not in values or value is None:
             raise InputError(
                 expected="arguments like -r scan:=front/scan -p mode:=full",
                 received=f"{flag}",
-                remedy=f"write {', '.join(told)}, each with a value",
+                remedy=f"write {', '.join(values)}, each with a value",
             )
-        told[flag].append(value)
-    names = names_from(told["-r"], "firstfix", "/")
+        values[flag].append(value)
+    names = names_from(values["-r"], "firstfix", "/")
     config = settings_from(
         node=names.node,
         amcl_file=None,
-        files=[Path(file) for file in told["--params-file"]],
-        assignments=told["-p"],
+        files=[Path(file) for file in values["--params-file"]],
+        assignments=values["-p"],
         options={"yaml_filename": map_file},
     )
     return config, names

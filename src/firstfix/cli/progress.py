@@ -21,20 +21,7 @@ def working(title: str) -> Iterator[None]:
 
 @contextmanager
 def progress(total: int, title: str) -> Iterator[Callable[[str], None]]:
-    """Show how far a loop has come, on stderr.
-
-    Parameters
-    ----------
-    total : int
-        Number of steps; with fewer than two nothing is shown.
-    title : str
-        What is going on.
-
-    Yields
-    ------
-    callable
-        To be told what was done, once a step.
-    """
+    """Show the progress of ``total`` steps on stderr; yields a callback for the end of a step."""
     if not sys.stderr.isatty() or total < 2:
         yield lambda _: None
         return

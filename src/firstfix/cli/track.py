@@ -68,13 +68,11 @@ def track(
         ),
     ] = None,
 ) -> None:
-    """Follow the robot through a log, from a known start or, with --start search, from anywhere.
+    """Track the robot through a log, from a known start or, with --start search, from anywhere.
 
-    Searching also checks every pose, and finds the robot again where it was carried away; exit
-    status 1 if it is never found.
-
-    Where the log knows the truth, the track is compared with it. Poses are those of the base in the
-    map.
+    A search also checks every pose, and finds the robot again after it was carried away; exit
+    status 1 if it is never found. If the log has true poses, the track is compared with them. All
+    poses are those of the base in the map.
     """
     requested = _parse_start(start)
     _check_targets(out, plot, keep_pose)

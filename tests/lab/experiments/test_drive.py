@@ -47,7 +47,7 @@ def test_every_run_begins_anew_where_its_truth_is_known(log: Recording) -> None:
     assert [sight.same_run for sight in drive.sights] == [False, True] * 3
     assert drive.sights[2].begin_at == drive.sights[2].truth
     (note,) = drive.notes
-    assert note.startswith("2 further run(s) of the log begin anew")
+    assert note.startswith("2 further run(s) of the log restart")
 
 
 def test_a_run_without_truth_goes_on_over_the_gap(log: Recording) -> None:

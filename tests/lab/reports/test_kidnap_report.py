@@ -130,7 +130,7 @@ def test_the_report_has_tables_and_the_curve(runs: list[KidnapRun], tmp_path: Pa
     assert kidnap_table(document).strip() in text
     assert (page.parent / "time_to_recover.png").stat().st_size > 5000
     nothing = [ran("office", "nothing")]
-    assert "Nothing." in write_kidnap_report(
+    assert "None." in write_kidnap_report(
         nothing, kidnap_document(nothing), tmp_path / "report"
     ).read_text(encoding="utf-8")
 

@@ -79,7 +79,7 @@ _NO_VERDICT = frozenset({Without.COST, Without.LAW})
 
 
 class AblatedMatcher:
-    """Finds scans in one map as `ScanMatcher` does, but for one step.
+    """Locates scans in one map as `ScanMatcher` does, without one step.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class AblatedMatcher:
     def __init__(self, fields: MapFields, without: Without) -> None:
         self._fields = fields
         self._without = without
-        # A field that is the same everywhere says nothing about where the robot is.
+        # A constant field carries no information about the pose.
         self._searched = fields
         if without is Without.EXPECTED_RANGES:
             self._searched = _altered(fields, ranges=_silent(fields.ranges))
@@ -188,22 +188,7 @@ class AblationTask:
 
 
 def ablate_case(case: Case, grid: OccupancyGrid, limit: int) -> tuple[AblationRun, ...]:
-    """Try a case with every step left out in turn, in this process.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    grid : OccupancyGrid
-        Its map.
-    limit : int
-        Scans to try, evenly spaced over those whose truth is known; 0 for all.
-
-    Returns
-    -------
-    tuple of AblationRun
-        One for each member of `Without`.
-    """
+    """Locate scans of a case, at most ``limit`` (0: all), with every step left out in turn."""
     recording, fields = case.recording(), MapFields(grid)
     truth = known_truth(case, recording)
     tried = evenly_spaced(np.flatnonzero(np.isfinite(truth).all(axis=1)), limit).tolist()

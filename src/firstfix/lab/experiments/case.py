@@ -120,17 +120,7 @@ class Case:
 
 
 def find_cases(folders: Sequence[Path]) -> list[Case]:
-    """List the cases in some folders; nothing but ``meta.json`` is read yet.
-
-    Parameters
-    ----------
-    folders : sequence of Path
-        Cases, or folders of cases.
-
-    Returns
-    -------
-    list of Case
-        In the order of the folders; those inside a folder by name.
+    """List the cases in folders: cases, or folders of cases. Only ``meta.json`` is read.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What of a recording can be followed, and where to begin."""
+"""The scans of a recording that can be tracked, and where to begin."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from firstfix.lab.experiments.case import truth_at
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """One scan of a drive, and what was known at its stamp.
+    """One scan of a drive, with odometry and truth at its stamp.
 
     Parameters
     ----------
@@ -22,13 +22,13 @@ class Sight:
     scan : LaserScan
         The scan.
     T_odom_base : SE2
-        Odometry at its stamp.
+        Odometry.
     truth : SE2 or None
-        ``T_map_base``; None where it is not known.
+        ``T_map_base``; None if it is unknown.
     begin_at : SE2 or None
-        ``T_map_base`` at which to begin anew here; None to go on from the scan before.
+        ``T_map_base`` of a new start; None to continue from the scan before.
     same_run : bool
-        True if the robot has not been elsewhere since the scan before.
+        False if the robot moved unobserved since the scan before.
     """
 
     index: int
@@ -61,15 +61,15 @@ class Drive:
     def begin_at(self) -> SE2:
         """Where to begin, ``T_map_base`` at the first scan."""
         pose = self.sights[0].begin_at
-        assert pose is not None  # noqa: S101 - said above; for the type checker
+        assert pose is not None  # noqa: S101 - ensured by `plan_drive`
         return pose
 
 
 def plan_drive(recording: Recording, start: SE2 | None) -> Drive:
-    """Decide which scans to follow and where to begin.
+    """Decide which scans to track and where to begin.
 
-    Between two runs of a recording the robot was elsewhere: a run begins at the true pose of its
-    first scan where that is known, else it goes on over the odometry of the gap.
+    Between two runs of a recording the robot moved unobserved. A run begins at the true pose of its
+    first scan if it is known; otherwise odometry bridges the gap.
 
     Parameters
     ----------
@@ -78,15 +78,10 @@ def plan_drive(recording: Recording, start: SE2 | None) -> Drive:
     start : SE2 or None
         ``T_map_base`` at the first scan that has odometry; None to begin at the first true pose.
 
-    Returns
-    -------
-    Drive
-        The scans, and what to know about them.
-
     Raises
     ------
     ScanError
-        If no scan has odometry, or no true pose is known where one is asked for.
+        If no scan has odometry, or no true pose is known where one is needed.
     """
     usable = known_odometry(recording)
     first = usable[0][0] if start is not None else _first_true(recording, usable)
@@ -124,7 +119,7 @@ def known_odometry(recording: Recording) -> list[tuple[int, SE2]]:
         raise ScanError(
             expected="a log with odometry",
             received=f"one of scans alone{why}",
-            remedy="record /tf and /tf_static, or /odom, beside the scans "
+            remedy="record /tf and /tf_static, or /odom, with the scans "
             "(.npz: an array `odom` [n, 3])",
         )
     known = [(i, odometry.at(scan.stamp)) for i, scan in enumerate(recording.scans)]
@@ -161,10 +156,10 @@ def _notes(sights: list[Sight], blind: int, early: int) -> tuple[str, ...]:
     counted = (
         (blind, "scan(s) have no odometry at their stamp and are left out"),
         (early, "scan(s) before the first true pose are left out"),
-        (anew, "further run(s) of the log begin anew at the true pose of their first scan"),
+        (anew, "further run(s) of the log restart at the true pose of their first scan"),
         (
             len(new) - anew,
-            "further run(s) begin without a true pose: tracked on over the odometry of the gap",
+            "further run(s) begin without a true pose: odometry bridges the gap",
         ),
     )
     return tuple(f"{count} {words}" for count, words in counted if count)

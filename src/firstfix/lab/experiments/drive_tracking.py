@@ -36,7 +36,7 @@ GIVEN_START = spread(0.5, 15.0)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TrackedScan:
-    """Where the robot was at a scan, and what it took to know.
+    """The tracked pose at a scan, and its cost.
 
     Parameters
     ----------
@@ -49,13 +49,13 @@ class TrackedScan:
     T_map_odom : SE2
         Drift of the odometry.
     updated : bool
-        True if the scan was used; else the pose is that of the last update, moved by odometry.
+        True if the filter used the scan; else odometry moved the pose of the last update.
     particles : int
-        Number of particles after it.
+        Number of particles.
     elsewhere : float
-        Share of the belief that is not at this place, 0 to 1.
+        Share of the particles' weight that is not at this place, 0 to 1.
     cpu_s : float
-        Processor time of this scan, s.
+        Processor time, s.
     """
 
     sight: Sight
@@ -85,28 +85,22 @@ def follow_drive(
     rng: np.random.Generator,
     fields: MapFields | None = None,
 ) -> Iterator[TrackedScan]:
-    """Follow a drive.
+    """Track a drive with the filter.
 
     Parameters
     ----------
     drive : Drive
         The scans, and where to begin.
     tracker : Tracker
-        The dynamic stage for the map.
+        The filter for the map.
     config : AmclConfig
-        Its settings; a belief begins with max_particles.
+        Its settings; a start draws max_particles.
     start_covariance : ndarray, shape (3, 3)
-        Of the first start, x (m), y (m), yaw (rad); later ones are at true poses: `TRUE_START`.
+        Of the first start, x (m), y (m), yaw (rad); later starts have `TRUE_START`.
     rng : numpy.random.Generator
         Source of randomness.
     fields : MapFields, optional
-        The prepared map, by which each pose is refined as a localizer does it; None leaves the
-        poses of the filter.
-
-    Yields
-    ------
-    TrackedScan
-        One for each scan of the drive.
+        The prepared map, to refine each pose as a localizer does; None keeps the filter's poses.
     """
     track: Track | None = None
     covariance = start_covariance

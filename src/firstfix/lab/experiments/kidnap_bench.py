@@ -1,4 +1,4 @@
-"""A localizer meets kidnappers: simulated ones, and those who splice drives."""
+"""Kidnaps of simulated robots, and of recorded ones by joining pieces of their drives."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _KINDS = {
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Observation:
-    """What a robot reports around one scan, and what is true at it.
+    """The reports of a robot around one scan, and the truth.
 
     Parameters
     ----------
@@ -53,9 +53,9 @@ class Observation:
     truth : SE2 or None
         ``T_map_base`` at the scan.
     disturbed : bool
-        True while something is being done to the robot.
+        True during a disturbance.
     over : str or None
-        The disturbance that was over just before.
+        The disturbance that ended just before.
     """
 
     events: tuple[LaserScan | Odometry | Signal, ...]
@@ -66,7 +66,7 @@ class Observation:
 
 @dataclass(frozen=True, slots=True)
 class KidnapResult:
-    """What came of a task: scenarios, or why there are none."""
+    """The scenarios of a task, or why there are none."""
 
     name: str
     runs: tuple[KidnapRun, ...]
@@ -75,18 +75,18 @@ class KidnapResult:
 
 @dataclass(frozen=True, slots=True)
 class KidnapWorldTask:
-    """Play some scenarios in a drawn building, one for each seed."""
+    """Run scenarios in a drawn building, one for each seed."""
 
     world: str
     seeds: tuple[int, ...]
 
     def __call__(self) -> KidnapResult:
-        """Play in this process."""
+        """Run in this process."""
         precompile()
         grid = WORLDS[self.world]()
-        return KidnapResult(self.world, tuple(self._play(grid, seed) for seed in self.seeds))
+        return KidnapResult(self.world, tuple(self._run(grid, seed) for seed in self.seeds))
 
-    def _play(self, grid: OccupancyGrid, seed: int) -> KidnapRun:
+    def _run(self, grid: OccupancyGrid, seed: int) -> KidnapRun:
         kind, phases = scripted(seed)
         moments = run(Scenario(phases), grid, seed)
         return judged_run(self.world, kind, seed, [*localized(simulated(moments), grid)])
@@ -94,13 +94,13 @@ class KidnapWorldTask:
 
 @dataclass(frozen=True, slots=True)
 class KidnapCaseTask:
-    """Play some drives spliced of a case's, one for each seed."""
+    """Run drives joined from pieces of a case, one for each seed."""
 
     case: Case
     seeds: tuple[int, ...]
 
     def __call__(self) -> KidnapResult:
-        """Play in this process."""
+        """Run in this process."""
         precompile()
         name, recording, grid = self.case.name, self.case.recording(), self.case.grid()
         runs = []
@@ -113,7 +113,7 @@ class KidnapCaseTask:
 
 
 def recorded(drive: Recording) -> Iterator[Observation]:
-    """Return what happens to the robot of a spliced drive, scan by scan; its runs are pieces."""
+    """Return the observations of a joined drive, scan by scan; its runs are the pieces."""
     assert drive.odometry is not None  # noqa: S101 - `splice` made it
     assert drive.runs is not None  # noqa: S101
     poses = [SE2.from_array(pose) for pose in drive.odometry.poses]
@@ -124,7 +124,7 @@ def recorded(drive: Recording) -> Iterator[Observation]:
 
 
 def simulated(moments: Iterable[Moment]) -> Iterator[Observation]:
-    """Return what happens to a simulated robot, scan by scan."""
+    """Return the observations of a simulated robot, scan by scan."""
     for moment in moments:
         over = None if moment.disturbance is None else _KINDS[moment.disturbance]
         underway = moment.phase in _UNDERWAY
@@ -132,20 +132,7 @@ def simulated(moments: Iterable[Moment]) -> Iterator[Observation]:
 
 
 def localized(observations: Iterable[Observation], grid: OccupancyGrid) -> Iterator[Instant]:
-    """Hand observations to a new localizer, and describe its answers.
-
-    Parameters
-    ----------
-    observations : iterable of Observation
-        In the order of their stamps.
-    grid : OccupancyGrid
-        The map.
-
-    Yields
-    ------
-    Instant
-        One for every scan.
-    """
+    """Hand observations to a new localizer, and yield its answer to every scan."""
     localizer = Localizer(cache_dir=cache_folder())
     localizer.handle(NewMap(0.0, grid))
     lifted: set[SignalKind] = set()

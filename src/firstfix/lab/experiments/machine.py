@@ -15,13 +15,10 @@ _COMMIT = re.compile(r"[0-9a-f]{40}")
 
 
 def this_machine() -> dict[str, Any]:
-    """Describe the machine and the software; the name of the machine is nobody's business.
+    """Describe the machine and the software; what is unknown is None.
 
-    Returns
-    -------
-    dict
-        ``date`` (UTC), ``cpu``, ``cores`` (that this process may use), ``memory_gb``, ``system``,
-        ``python``, versions of packages, ``commit``. What is not known is None.
+    Keys: ``date`` (UTC), ``cpu``, ``cores`` (usable by this process), ``memory_gb``, ``system``,
+    ``python``, versions of packages, ``commit``.
     """
     return {
         "date": datetime.now(timezone.utc).date().isoformat(),

@@ -59,7 +59,7 @@ PAPER_WORLDS: dict[str, Callable[[], OccupancyGrid]] = {
 DRIVE_S = 60.0
 _STANDS_S = 1.0
 
-# How far a person who points at a map is off.
+# Error of a person who points at a map.
 HAND_SIGMA_M = 0.3
 HAND_SIGMA_RAD = math.radians(10.0)
 
@@ -75,27 +75,13 @@ _SURE_M = 0.5
 _KEPT_PARTICLES = 400
 
 Beginning = Callable[[Sight], Particles | None]
-"""The belief to begin with at a scan; None if that scan does not tell."""
+"""The particles to begin with at a scan; None if the scan does not give a pose."""
 
 
 def attempt(start: Start, drive: Drive, grid: OccupancyGrid, seed: int) -> Attempt:
-    """Begin a drive in one way and follow it with AMCL under Nav2's default parameters.
+    """Track a drive with AMCL under Nav2's default parameters, from one kind of start.
 
-    Parameters
-    ----------
-    start : Start
-        Any but `Start.SYSTEM`, which is more than a filter that was begun somewhere.
-    drive : Drive
-        Scans with odometry and truth.
-    grid : OccupancyGrid
-        The map.
-    seed : int
-        Of all randomness.
-
-    Returns
-    -------
-    Attempt
-        What was believed, scan by scan.
+    ``start`` is any but `Start.SYSTEM`; the drive has odometry and true poses.
     """
     config, rng = AmclConfig(), np.random.default_rng(seed)
     began = time.process_time()
@@ -126,7 +112,7 @@ def _follow(
     track: Track | None = None
     tried_at: SE2 | None = None
     for sight in drive.sights:
-        assert sight.truth is not None  # noqa: S101 - said in `attempt`
+        assert sight.truth is not None  # noqa: S101 - ensured by `attempt`
         cpu = time.thread_time()
         if track is not None:
             track = tracker.follow(track, sight.T_odom_base, sight.scan, rng)
@@ -170,7 +156,7 @@ def _beginning(start: Start, grid: OccupancyGrid, n: int, rng: np.random.Generat
 
 
 def _pointed_at(sight: Sight, rng: np.random.Generator) -> SE2:
-    assert sight.truth is not None  # noqa: S101 - said in `attempt`
+    assert sight.truth is not None  # noqa: S101 - ensured by `attempt`
     error = rng.standard_normal(3) * [HAND_SIGMA_M, HAND_SIGMA_M, HAND_SIGMA_RAD]
     return SE2.from_array(sight.truth.as_array() + error)
 
@@ -205,26 +191,26 @@ class PaperResult:
 
 @dataclass(frozen=True, slots=True)
 class PaperTask:
-    """Drive in one world, once for each seed, and begin every drive in every way."""
+    """Drive in one world, once for each seed, and start every drive in every way."""
 
     world: str
     seeds: tuple[int, ...]
     drive_s: float = DRIVE_S
 
     def __call__(self) -> PaperResult:
-        """Play in this process."""
+        """Run in this process."""
         precompile(methods=[Method.PAPER])
         grid = at_home(PAPER_WORLDS[self.world]())
         trials: list[Trial] = []
-        stories: list[tuple[int, Shown]] = []
+        shown_drives: list[tuple[int, Shown]] = []
         for seed in self.seeds:
             recording = simulated_drive(grid, seed, self.drive_s)
             attempts = _attempts(recording, grid, seed)
             judged = [judge_attempt(self.world, seed, tried) for tried in attempts]
             trials += judged
             shown = Shown(self.world, seed, grid, recording.scans, attempts)
-            stories.append((_differences(judged), shown))
-        _, most_telling = max(stories, key=lambda story: story[0])
+            shown_drives.append((_differences(judged), shown))
+        _, most_telling = max(shown_drives, key=lambda shown: shown[0])
         return PaperResult(self.world, tuple(trials), most_telling)
 
 
@@ -239,12 +225,12 @@ def at_home(grid: OccupancyGrid) -> OccupancyGrid:
 
 
 def simulated_drive(grid: OccupancyGrid, seed: int, seconds: float) -> Recording:
-    """Let a robot wake up somewhere and drive from goal to goal for a time (s)."""
+    """Simulate a robot that wakes up at a random pose and drives from goal to goal (s)."""
     return record(run(Scenario([Stand(_STANDS_S), Wander(seconds - _STANDS_S)]), grid, seed))
 
 
 def follow_with_system(recording: Recording, grid: OccupancyGrid) -> Attempt:
-    """Let a new localizer live through a drive whose truth is known."""
+    """Replay a drive with known truth to a new localizer."""
     began = time.process_time()
     localizer = Localizer()
     localizer.handle(NewMap(0.0, grid))
@@ -279,6 +265,6 @@ def _attempts(recording: Recording, grid: OccupancyGrid, seed: int) -> tuple[Att
 
 
 def _differences(judged: Sequence[Trial]) -> int:
-    """Tell how much a drive has to show: ways that end wrong although others end right."""
+    """Count the starts that end wrong, if others end right: how instructive a drive is."""
     wrong = sum(trial.ending is Ending.WRONG for trial in judged)
     return wrong if any(trial.ending is Ending.RIGHT for trial in judged) else 0

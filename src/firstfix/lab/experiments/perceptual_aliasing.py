@@ -28,7 +28,7 @@ _SIGMA_M = 0.01
 
 
 class Look(Enum):
-    """What one scan tells at a place."""
+    """The result of one scan at a place."""
 
     FOUND = "UNIQUE and right"
     AMBIGUOUS = "AMBIGUOUS"
@@ -38,16 +38,16 @@ class Look(Enum):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Place:
-    """A place of the map, and what a scan from it was taken for.
+    """A place of the map, and the answer to a scan from it.
 
     Parameters
     ----------
     pose : SE2
         ``T_map_base`` of the scan.
     look : Look
-        What the scan tells.
+        The result.
     double : Hypothesis or None
-        The most likely other place; None if there is no plausible one.
+        The most likely other place, if it is plausible.
     """
 
     pose: SE2
@@ -63,20 +63,7 @@ def sensor(beams: int, fov_deg: float, range_m: float) -> Lidar:
 def survey(
     grid: OccupancyGrid, lidar: Lidar, samples: int, seed: int, done: Callable[[str], None]
 ) -> list[Place]:
-    """Locate simulated scans from random places of a map.
-
-    Parameters
-    ----------
-    grid : OccupancyGrid
-        The map.
-    lidar : Lidar
-        The sensor.
-    samples : int
-        Number of places.
-    seed : int
-        Of places and noise.
-    done : callable
-        Takes the result at every place, in words.
+    """Locate simulated scans from random places; ``done`` takes each result in words.
 
     Raises
     ------
@@ -95,20 +82,7 @@ def survey(
 
 
 def look_from(pose: SE2, result: LocateResult) -> Place:
-    """Compare where a scan was taken with where it was found.
-
-    Parameters
-    ----------
-    pose : SE2
-        ``T_map_base`` of the scan.
-    result : LocateResult
-        The answer to it.
-
-    Returns
-    -------
-    Place
-        The place, and its double.
-    """
+    """Compare the true ``T_map_base`` of a scan with the answer to it."""
     others = [
         hypothesis
         for hypothesis in result.hypotheses

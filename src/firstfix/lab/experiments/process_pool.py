@@ -30,19 +30,19 @@ def run_in_processes(
     tasks : sequence of callable
         Picklable, as are their results.
     jobs : int
-        How many run at a time.
+        Processes at a time.
     on_done : callable
-        Is told index and result of each task as it ends.
+        Takes index and result of each task when it ends.
 
     Returns
     -------
     list
-        Results, in the order of the tasks, whatever the order of their ends.
+        Results in the order of the tasks.
 
     Raises
     ------
     InputError
-        If a process was killed. What a task raises is raised here.
+        If a process was killed. An exception of a task is raised here.
     """
     context = multiprocessing.get_context("spawn")
     waiting = deque(enumerate(tasks))

@@ -211,22 +211,7 @@ class ThroughputTask:
 def locate_in_threads(
     matcher: ScanMatcher, scans: Sequence[LaserScan], threads: int
 ) -> list[LocateResult]:
-    """Locate scans by several threads that share one prepared map.
-
-    Parameters
-    ----------
-    matcher : ScanMatcher
-        The map.
-    scans : sequence of LaserScan
-        The scans.
-    threads : int
-        How many work at a time.
-
-    Returns
-    -------
-    list of LocateResult
-        In the order of the scans.
-    """
+    """Locate scans by several threads that share one prepared map; results keep the order."""
     with ThreadPoolExecutor(threads) as pool:
         return list(pool.map(matcher.locate, scans))
 
@@ -236,14 +221,7 @@ def scaling_tasks(
 ) -> list[tuple[str, CostTask | ThroughputTask]]:
     """List what to measure, each with the list of the document that its result belongs to.
 
-    Parameters
-    ----------
-    seed : int
-        Of furniture, places and noise.
-    offices : sequence of int
-        Sizes of the maps, in offices.
-    beams : sequence of int
-        Numbers of beams, varied in some of the maps.
+    ``offices`` are the sizes of the maps; ``beams`` are varied in some of the maps.
     """
     tasks: list[tuple[str, CostTask | ThroughputTask]] = []
     for count in offices:

@@ -1,4 +1,4 @@
-"""Kidnaps of real robots: pieces of their drives joined; odometry goes on, the truth jumps."""
+"""Kidnaps of recorded robots: pieces of drives joined, so that the truth jumps unreported."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from firstfix.lab.metrics.kidnap_trial import NEAR
 # A piece is as long as a robot needs to be found and to be seen to be right for 10 s.
 SHORTEST_S, LONGEST_S = 20.0, 30.0
 
-# With fewer scans a second nobody could tell a late answer from a late scan.
+# At lower scan rates a late answer cannot be distinguished from a late scan.
 MOST_APART_S = 1.0
 
 _TRIES = 200
@@ -33,22 +33,13 @@ class Unfit:
 
 
 def splice(recording: Recording, kidnaps: int, rng: np.random.Generator) -> Recording | Unfit:
-    """Join pieces of a recorded drive at random.
-
-    Parameters
-    ----------
-    recording : Recording
-        Scans with odometry and, as far as known, truth.
-    kidnaps : int
-        Number of seams.
-    rng : numpy.random.Generator
-        Source of chance.
+    """Join random pieces of a recorded drive with ``kidnaps`` seams.
 
     Returns
     -------
     Recording or Unfit
-        A drive that begins at 0 s; its runs number the pieces. Odometry stands still over a seam,
-        where the true pose is known on both sides and farther apart than `NEAR`.
+        A drive that begins at 0 s; its runs number the pieces. Odometry stands still over a seam.
+        The true poses on both sides of it are known and farther apart than `NEAR`.
     """
     if recording.odometry is None:
         return Unfit("no odometry")

@@ -49,16 +49,16 @@ COLUMNS = (
 
 @dataclass(frozen=True, slots=True)
 class TrackRun:
-    """One case, followed.
+    """The result of tracking one case.
 
     Parameters
     ----------
     case, sensor : str
         Its name, and the sensor that its scans are cut to.
     figures : TrackFigures or None
-        How well; None where the case has no odometry and was left out.
+        None if the case has no odometry.
     notes : tuple of str
-        What of the case was left out, for a person.
+        What was left out of the case.
     rss_mb : float or None
         Peak resident memory of the process that did this and nothing else, MB.
     """

@@ -45,7 +45,7 @@ SEARCH = "search"
 
 
 class Origin(Enum):
-    """Whose word the start is; the values are those of the JSON."""
+    """Where the first pose comes from; the values are those of the JSON."""
 
     GIVEN = "given"
     SAVED = "saved"
@@ -56,18 +56,18 @@ class Origin(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where to begin.
+    """The pose to begin at.
 
     Parameters
     ----------
     origin : Origin
-        Whose word it is.
+        Where the pose comes from.
     T_map_base : SE2 or None
-        The pose at the first scan that has odometry; None for the first true pose, or the search.
+        The pose at the first scan that has odometry; None for the first true pose, or a search.
     covariance : ndarray, shape (3, 3)
-        How sure that is: x (m), y (m), yaw (rad).
+        Of x (m), y (m), yaw (rad).
     note : str
-        For a person.
+        Describes the start.
     """
 
     origin: Origin
@@ -77,14 +77,9 @@ class Start:
 
 
 def load_config(params: Path | None, seed: int | None) -> NodeConfig:
-    """Return the parameters of a file of Nav2, section ``amcl``, else the defaults.
+    """Return the parameters in a file of Nav2, section ``amcl``; the defaults without a file.
 
-    Parameters
-    ----------
-    params : Path or None
-        The file.
-    seed : int or None
-        Replaces ``random_seed`` if it is given.
+    A ``seed`` replaces ``random_seed``.
 
     Raises
     ------
@@ -99,14 +94,17 @@ def load_config(params: Path | None, seed: int | None) -> NodeConfig:
 
 
 def choose_start(
-    said: SE2 | Path | str | None, grid: OccupancyGrid, recording: Recording, config: NodeConfig
+    requested: SE2 | Path | str | None,
+    grid: OccupancyGrid,
+    recording: Recording,
+    config: NodeConfig,
 ) -> Start:
-    """Choose where to begin: what was said, else what the parameters say, else the truth.
+    """Choose where to begin: as requested, else as the parameters say, else at the first true pose.
 
     Parameters
     ----------
-    said : SE2, Path, str or None
-        From `read_start`.
+    requested : SE2, Path, str or None
+        A pose, the file of a saved pose, `SEARCH`, `TRUTH`, or None.
     grid : OccupancyGrid
         The map.
     recording : Recording
@@ -114,35 +112,31 @@ def choose_start(
     config : NodeConfig
         set_initial_pose and initial_pose.
 
-    Returns
-    -------
-    Start
-        In the map.
-
     Raises
     ------
     InputError
-        If nobody knows where to begin, a saved pose must not be used, or it is outside the map.
+        If no start is known, a saved pose is stale or belongs to another map, or the start is
+        outside the map.
     """
     known_odometry(recording)  # no start helps without odometry
-    if said == SEARCH:
+    if requested == SEARCH:
         start = Start(Origin.SEARCH, None, TRUE_START, "searching the whole map")
-    elif isinstance(said, Path):
-        start = _saved(said, grid, recording)
-    elif isinstance(said, SE2):
-        start = Start(Origin.GIVEN, said, GIVEN_START, "starting at the pose given")
-    elif said is None and config.set_initial_pose:
+    elif isinstance(requested, Path):
+        start = _saved(requested, grid, recording)
+    elif isinstance(requested, SE2):
+        start = Start(Origin.GIVEN, requested, GIVEN_START, "starting at the pose given")
+    elif requested is None and config.set_initial_pose:
         words = "starting at initial_pose of the parameters"
         start = Start(Origin.PARAMETERS, config.initial_pose, GIVEN_START, words)
     else:
-        start = _true(recording, is_asked_for=said is not None)
+        start = _true(recording, is_asked_for=requested is not None)
     if start.T_map_base is not None:
         check_start(grid, start.T_map_base)
     return start
 
 
 class NeverFoundError(FirstfixError):
-    """A log at no scan of which a pose could be published."""
+    """No pose was published at any scan of a log."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -214,29 +208,20 @@ def track_log(
 def search_and_follow(
     recording: Recording, grid: OccupancyGrid, config: AmclConfig, done: Callable[[str], None]
 ) -> tuple[Drive, list[TrackedScan]]:
-    """Replay a log to a localizer.
+    """Replay a log to a localizer that searches the whole map.
 
-    Parameters
-    ----------
-    recording : Recording
-        Scans with odometry.
-    grid : OccupancyGrid
-        The map.
-    config : AmclConfig
-        Settings of the dynamic stage.
-    done : callable
-        Told the state after every scan.
+    ``done`` takes the state after every scan.
 
     Returns
     -------
     tuple of Drive and list of TrackedScan
-        The scans at which a pose was published, and these poses. Every one of these scans was used,
-        be it only to judge the pose; `begin_at` is where the robot was found, or found again.
+        The scans with a published pose, and these poses. `begin_at` is set where the robot was
+        found, or found again.
 
     Raises
     ------
     NeverFoundError
-        If there is none.
+        If no pose was published.
     """
     odometry = dict(known_odometry(recording))
     index_at = {scan.stamp: i for i, scan in enumerate(recording.scans)}
@@ -298,12 +283,12 @@ def _notes(recording: Recording, tracked: list[TrackedScan]) -> tuple[str, ...]:
     waited = first.scan.stamp - recording.scans[0].stamp
     again = sum(scan.sight.begin_at is not None for scan in tracked) - 1
     silent = len(recording) - first.index - len(tracked)
-    told = [f"found after {waited:.1f} s, at scan {first.index}"]
+    notes = [f"found after {waited:.1f} s, at scan {first.index}"]
     if again:
-        told.append(f"found elsewhere {again} more time(s)")
+        notes.append(f"found elsewhere {again} more time(s)")
     if silent:
-        told.append(f"no pose for {silent} scan(s) in between")
-    return tuple(told)
+        notes.append(f"no pose for {silent} scan(s) in between")
+    return tuple(notes)
 
 
 def _true(recording: Recording, *, is_asked_for: bool) -> Start:
@@ -325,7 +310,7 @@ def _saved(path: Path, grid: OccupancyGrid, recording: Recording) -> Start:
         now=recording.scans[index].stamp,
         T_odom_base=T_odom_base,
         map_key=map_key(grid),
-        max_age_s=math.inf,  # who names the file says that it holds
+        max_age_s=math.inf,  # naming the file confirms that it is valid
     )
     if recalled.T_map_base is None:
         raise InputError(
@@ -333,7 +318,7 @@ def _saved(path: Path, grid: OccupancyGrid, recording: Recording) -> Start:
             received=f"{path}: {recalled.reason}",
             remedy="run `firstfix locate --json`, and give its `pose`: --start X,Y,YAW",
         )
-    # The robot may have been nudged since; and a covariance of millimetres would not admit it.
+    # The robot may have been nudged since, which a covariance of millimetres excludes.
     covariance = saved.covariance + TRUE_START
     words = f"starting at the pose of {path}, {recalled.outcome.value} ({recalled.reason})"
     return Start(Origin.SAVED, recalled.T_map_base, covariance, words)

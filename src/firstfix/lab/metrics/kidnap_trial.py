@@ -1,4 +1,4 @@
-"""What became of a robot that was moved without its wheels: noticed, found again, or misled."""
+"""Kidnaps judged: detected, recovered, or a wrong pose published."""
 
 from __future__ import annotations
 
@@ -15,51 +15,51 @@ from firstfix.core.se2 import SE2
 RIGHT = PoseError(0.45, math.radians(10.0))
 HELD_S = 10.0
 
-# Moved less than this by whoever it was, a robot has not been kidnapped.
+# A smaller displacement is no kidnap.
 NEAR = PoseError(0.5, math.radians(20.0))
 
 DETECTED_WITHIN_S = 3.0
 SLOW_S = 3.0
 
 SLIP = "slip"
-"""The disturbance that is none of a kidnapper, however far it goes."""
+"""The disturbance that is no kidnap, whatever its size."""
 
 _EPS_S = 1e-6  # stamps are sums of floats
 
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """One scan: what was true, and what the localizer made of it.
+    """One scan: the truth, and the answer of the localizer.
 
     Parameters
     ----------
     stamp : float
         Time of the scan, s.
     truth : SE2 or None
-        ``T_map_base``; None where it is not known.
+        ``T_map_base``; None if it is unknown.
     T_odom_base : SE2
         Odometry at the scan.
     useful : bool
         True if the robot stands on its wheels and at least `global_localization.beams.FEWEST_HITS`
         beams hit something.
     disturbed : bool
-        True while something is being done to the robot.
+        True during a disturbance.
     over : str or None
-        The disturbance that was over just before this scan.
+        The disturbance that ended just before this scan.
     signalled : bool
-        True if a sensor of the base has just begun to report that the robot was lifted.
+        True if a sensor of the base has just begun to report that the robot is lifted.
     localized : bool
-        True if the localizer claims to know where the robot is, after this scan.
+        True if the localizer is in the state LOCALIZED after this scan.
     published : SE2 or None
-        The pose that it gave for this scan.
+        The published pose.
     fixes : tuple of SE2
-        Poses at which it said to have found the robot, at the start or anew.
+        Poses published as found, at the start or again.
     places : tuple of Hypothesis or None
-        The places that it reported for this scan.
+        The places that were reported for this scan.
     said : tuple of str
-        Its words, for a person.
+        Status messages.
     cpu_s : float
-        Processor time that it took, s.
+        Processor time, s.
     """
 
     stamp: float
@@ -87,22 +87,22 @@ class Instant:
         return self.truth is not None and self.published is not None and not self.is_right
 
     def is_true(self, pose: SE2) -> bool:
-        """Tell whether a pose is that of the robot; False where the truth is not known."""
+        """Return whether a pose is the true one; False if the truth is unknown."""
         return self.truth is not None and PoseError.between(pose, self.truth).is_within(RIGHT)
 
 
 @dataclass(frozen=True, slots=True)
 class Aftermath:
-    """What followed one disturbance, or the start.
+    """The time after one disturbance, or after the start.
 
     Parameters
     ----------
     kind : str
-        The disturbance; ``start`` for the start.
+        The disturbance, or ``start``.
     stamp : float
-        Time of the first useful scan after it, s.
+        Time of the first useful scan, s.
     is_kidnap : bool
-        True if it took the robot farther than `NEAR` from where odometry says, and is no slip.
+        True if the robot moved farther than `NEAR` from where odometry puts it, and did not slip.
     signalled : bool
         True if a sensor of the base reported it.
     known_before : bool
@@ -130,30 +130,27 @@ class Aftermath:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One scenario, judged; every index is that of an instant.
+    """The judgement of one scenario; every index is that of an instant.
 
-    Calm is from the end of the `HELD_S` that prove a recovery to the next disturbance: before,
-    a better pose still belongs to the recovery.
+    Calm lasts from the end of the `HELD_S` that prove a recovery to the next disturbance.
 
     Parameters
     ----------
     start : Aftermath or None
-        What followed the start; None if no scan was useful.
+        After the start; None if no scan was useful.
     aftermaths : tuple of Aftermath
-        Of all disturbances that useful scans followed.
+        After every disturbance that is followed by useful scans.
     first_fix : bool or None
-        Whether the first pose at which the robot was found, before any disturbance, was right;
-        None if there was none.
+        Whether the first pose published as found, before any disturbance, was right; None without
+        one.
     wrong_fixes : tuple of int
-        Where a robot was said to be found that was elsewhere.
+        Wrong poses published as found.
     alarms : tuple of int
-        Where, in calm, a robot was given up or found anew whose published pose was not wrong.
+        False alarms: in calm, a pose that was not wrong was given up or replaced.
     strays : tuple of int
-        Where, in calm, a published pose that had been right was not any more.
-    calm_s : float
-        How long it was calm, s.
-    duration_s : float
-        Of the whole scenario, s.
+        In calm, the published pose became wrong.
+    calm_s, duration_s : float
+        Length of the calm, and of the whole scenario, s.
     """
 
     start: Aftermath | None
@@ -167,18 +164,7 @@ class Trial:
 
 
 def judge_trial(instants: Sequence[Instant]) -> Trial:
-    """Judge what a localizer made of a scenario.
-
-    Parameters
-    ----------
-    instants : sequence of Instant
-        All scans in the order of their stamps, at least one.
-
-    Returns
-    -------
-    Trial
-        The judgement.
-    """
+    """Judge a localizer by all scans of a scenario, at least one, in the order of their stamps."""
     episodes = _episodes(instants)
     calm_s = 0.0
     alarms: list[int] = []

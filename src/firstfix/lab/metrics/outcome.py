@@ -1,4 +1,4 @@
-"""What came of one scan, compared with the truth."""
+"""Answers to single scans, compared with the truth."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ FOUND_WELL = PoseError(0.2, math.radians(3.0))
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of one scan.
+    """The answer to one scan, compared with the truth.
 
     Parameters
     ----------
     index : int
         Index of the scan in its recording.
     verdict : Verdict
-        What the method said.
+        The verdict.
     error : PoseError
         Of the best hypothesis.
     rank : int or None
@@ -31,7 +31,7 @@ class Outcome:
     cpu_s, wall_s : float
         Processor and wall time of ``locate``, s.
     probability : float
-        That was claimed for the best hypothesis, 0 to 1; 0 if there is none.
+        Of the best hypothesis, 0 to 1; 0 if there is none.
     """
 
     index: int
@@ -49,29 +49,12 @@ class Outcome:
 
 
 def is_found(pose: SE2, truth: SE2 | None) -> bool:
-    """Tell whether a pose is within `FOUND` of the truth; False where the truth is not known."""
+    """Return whether a pose is within `FOUND` of the truth; False if the truth is unknown."""
     return truth is not None and PoseError.between(pose, truth).is_within(FOUND)
 
 
 def judge(result: LocateResult, truth: SE2, *, index: int, cpu_s: float, wall_s: float) -> Outcome:
-    """Compare an answer with the truth, whatever its verdict.
-
-    Parameters
-    ----------
-    result : LocateResult
-        The answer.
-    truth : SE2
-        ``T_map_base``.
-    index : int
-        Index of the scan.
-    cpu_s, wall_s : float
-        What the answer took, s.
-
-    Returns
-    -------
-    Outcome
-        The scan in figures.
-    """
+    """Compare an answer with the true ``T_map_base``, whatever its verdict; times in s."""
     errors = [PoseError.between(hypothesis.pose, truth) for hypothesis in result.hypotheses]
     ranks = [rank for rank, error in enumerate(errors, 1) if error.is_within(FOUND)]
     return Outcome(

@@ -46,7 +46,7 @@ WORDS = {
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """Where a robot was, and was believed to be, at one scan.
+    """The true and the estimated pose at one scan.
 
     Parameters
     ----------
@@ -55,9 +55,9 @@ class Belief:
     truth : SE2
         ``T_map_base``.
     T_map_base : SE2 or None
-        The pose believed in; None while there is none.
+        The estimate.
     sure : bool
-        True if it would be acted upon.
+        True if a robot would act upon the estimate.
     cpu_s : float
         Processor time of this scan, s.
     """
@@ -71,14 +71,14 @@ class Belief:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Attempt:
-    """One drive, begun in one way.
+    """One drive with one kind of start.
 
     Parameters
     ----------
     start : Start
-        The way.
+        The kind of start.
     prepare_s : float
-        Processor time that preparing the map took, s.
+        Processor time of preparing the map, s.
     beliefs : tuple of Belief
         One for each scan.
     first_cloud, last_cloud : ndarray, shape (n, 3)
@@ -137,22 +137,7 @@ class Trial:
 
 
 def judge_attempt(world: str, seed: int, attempt: Attempt) -> Trial:
-    """Compare what was believed with the truth.
-
-    Parameters
-    ----------
-    world : str
-        The building.
-    seed : int
-        Of the drive.
-    attempt : Attempt
-        With at least one belief.
-
-    Returns
-    -------
-    Trial
-        The attempt in figures.
-    """
+    """Compare the estimates of an attempt, at least one, with the true poses."""
     beliefs = attempt.beliefs
     settled = _settled(beliefs)
     steps = [a.truth.distance_to(b.truth) for a, b in pairwise(beliefs)]

@@ -1,4 +1,4 @@
-"""Whether a probability is worth its name, and how much can be answered at how little risk.
+"""Calibration of the probabilities, and coverage against risk.
 
 For the JSON document of ``bench``, one entry for each method, sensor and kind of case::
 
@@ -27,10 +27,10 @@ from firstfix.lab.reports.text import Row, columns_table
 GOAL_RISK = 0.003
 GOAL_COVERAGE = 0.88
 
-# Narrow where it matters: nobody acts on 0.4 or 0.6, but everybody on 0.95 or 0.99.
+# Narrow near 1, where robots act on the answer.
 _EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 0.99, 1.0)
 
-# Points of a curve that a program may want to draw again.
+# Points of a curve in the JSON.
 _MOST_POINTS = 200
 
 # Two-sided 95 %.
@@ -48,7 +48,7 @@ COLUMNS = (
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RiskCurve:
-    """What is answered, and wrongly, where everything from a probability on is answered.
+    """Coverage and risk if every answer from a threshold of probability on is accepted.
 
     Parameters
     ----------
@@ -86,21 +86,16 @@ def risk_curve(
     right: NDArray[np.bool_],
     wrong_map: NDArray[np.float64],
 ) -> RiskCurve:
-    """Sweep the threshold over all probabilities that occur.
+    """Sweep the threshold over all probabilities that occur and are above 0.
 
     Parameters
     ----------
     probabilities : ndarray, shape (n,)
-        Claimed for the best place of each scan on its own map; at least one.
+        Of the best place of each scan in its own map; at least one.
     right : ndarray of bool, shape (n,)
         Whether it is the right place.
     wrong_map : ndarray, shape (m,)
-        Claimed for the best place of scans of other buildings; empty to leave them out.
-
-    Returns
-    -------
-    RiskCurve
-        One point for every probability above 0: who claims nothing is never answered.
+        Of the best place of scans of other buildings; may be empty.
     """
     thresholds = np.unique(np.concatenate([probabilities, wrong_map]))[::-1]
     thresholds = thresholds[thresholds > 0.0]
@@ -114,20 +109,10 @@ def risk_curve(
 def reliability_bins(
     probabilities: NDArray[np.float64], right: NDArray[np.bool_]
 ) -> list[dict[str, Any]]:
-    """Compare what was claimed with what came true, in bins of probability.
+    """Compare probabilities of the best places, shape (n,), with the share that is right, in bins.
 
-    Parameters
-    ----------
-    probabilities : ndarray, shape (n,)
-        Claimed for the best place of each scan.
-    right : ndarray of bool, shape (n,)
-        Whether it is the right place.
-
-    Returns
-    -------
-    list of dict
-        One for each bin that has a scan: its ends, number of scans, mean claim, share that is
-        right, and the ends of Wilson's 95 % interval of that share.
+    Every bin that has a scan gives its ends, number of scans, mean probability, share that is
+    right, and Wilson's 95 % interval of that share.
     """
     bins = []
     for low, high in pairwise(_EDGES):
@@ -154,20 +139,7 @@ def reliability_bins(
 def reliability_document(
     runs: Sequence[CaseRun], wrong_map: Sequence[WrongMapRun]
 ) -> list[dict[str, Any]]:
-    """Put all scans of a method, sensor and kind into figures, as described above.
-
-    Parameters
-    ----------
-    runs : sequence of CaseRun
-        Cases on their own maps.
-    wrong_map : sequence of WrongMapRun
-        Cases on the maps of others; may be empty.
-
-    Returns
-    -------
-    list of dict
-        One for each method, sensor and kind; scans count alike, whatever case they are of.
-    """
+    """Put all scans by method, sensor and kind into figures, as described above."""
     keys = dict.fromkeys(_key(run) for run in runs)
     return [
         _entry([r for r in runs if _key(r) == key], [r for r in wrong_map if _key(r) == key])

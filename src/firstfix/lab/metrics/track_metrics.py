@@ -94,20 +94,11 @@ def summarize_track(tracked: Sequence[TrackedScan]) -> TrackFigures:
 def relative_errors(
     tracked: Sequence[TrackedScan], piece_m: float = RPE_PIECE_M
 ) -> list[PoseError]:
-    """Compare motions with the true ones, piece by piece.
+    """Compare motions with the true ones over pieces of the true path.
 
-    Parameters
-    ----------
-    tracked : sequence of TrackedScan
-        A tracked drive; scans without a true pose are passed over.
-    piece_m : float
-        Length of a piece: it ends at the first scan from there on, where the next one begins.
-        Sum of the distances between true positions, m.
-
-    Returns
-    -------
-    list of PoseError
-        One for each piece; none reaches over a gap between runs.
+    A piece ends at the first scan that is at least ``piece_m`` (m, sum of the distances between
+    true positions) after its start. No piece spans a gap between runs. Scans without a true pose
+    are skipped.
     """
     errors: list[PoseError] = []
     start: tuple[SE2, SE2] | None = None

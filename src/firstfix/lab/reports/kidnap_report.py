@@ -74,23 +74,23 @@ KIND_COLUMNS = (
     ("alarms/h", "false_alarms_per_h", ".1f"),
 )
 
-# How much of what was said goes with an incident.
+# Status messages kept with an incident.
 _BEFORE_S, _AFTER_S, _LONG_S = 0.5, 2.0, 12.0
 _MOST_LINES = 24
 
 
 @dataclass(frozen=True, slots=True)
 class Incident:
-    """Something that a person should look at.
+    """An event to investigate.
 
     Parameters
     ----------
     stamp : float
-        When, s.
+        Time, s.
     what : str
-        In words.
+        Description.
     said : tuple of str
-        What the localizer said around it, what repeats itself left out.
+        Status messages around it, without repetitions.
     """
 
     stamp: float
@@ -100,20 +100,20 @@ class Incident:
 
 @dataclass(frozen=True, slots=True)
 class KidnapRun:
-    """One scenario in one world, or one spliced drive of a case.
+    """One scenario in one world, or one drive joined from pieces of a case.
 
     Parameters
     ----------
     world : str
         The world or case.
     kind : str
-        Of the scenario.
+        Kind of the scenario.
     seed : int
-        With world and kind, all that is needed to play it again.
+        World, kind and seed reproduce the scenario.
     trial : Trial
-        How it went.
+        The judgement.
     incidents : tuple of Incident
-        What to look at.
+        What to investigate.
     cpu_s : tuple of float
         Processor time for each scan, s.
     """
@@ -127,7 +127,7 @@ class KidnapRun:
 
 
 def judged_run(world: str, kind: str, seed: int, instants: Sequence[Instant]) -> KidnapRun:
-    """Judge a scenario and collect what to look at; arguments as those of `KidnapRun`."""
+    """Judge a scenario and collect incidents; arguments as those of `KidnapRun`."""
     trial = judge_trial(instants)
     cpu_s = tuple(instant.cpu_s for instant in instants)
     return KidnapRun(world, kind, seed, trial, _incidents(trial, instants), cpu_s)
@@ -220,7 +220,7 @@ def _aftermath_figures(aftermaths: Sequence[Aftermath]) -> dict[str, Any]:
     recover_s = [a.recovered_after_s for a in aftermaths]
     return {
         "detected": len(detected),
-        # Who did not know where the robot was had nothing to give up.
+        # A localizer without a right pose had nothing to give up.
         "delay_s": _percentile([a.left_after_s for a in detected if a.known_before], 50),
         "recovered": sum(seconds is not None for seconds in recover_s),
         "recover_s": _percentile(recover_s, 50),
@@ -286,7 +286,7 @@ def _error_text(instant: Instant, words: str) -> str:
 
 
 def _said(instants: Sequence[Instant], begin_s: float, end_s: float) -> tuple[str, ...]:
-    """Return what was said in a time, and how far off it was; alike lines once."""
+    """Return the status messages of a time with the pose error; similar lines once."""
     lines: list[str] = []
     last: object = None
     for instant in instants:
@@ -340,9 +340,9 @@ def _parts(document: dict[str, Any]) -> list[str]:
     if document["left_out"]:
         parts += [f"Left out: {row['name']} ({row['why']})." for row in document["left_out"]]
     parts += ["## Time to recover", "![share recovered by time](time_to_recover.png)"]
-    parts += ["## What to look at", *(_incident(row) for row in document["incidents"])]
+    parts += ["## Incidents", *(_incident(row) for row in document["incidents"])]
     if not document["incidents"]:
-        parts.append("Nothing.")
+        parts.append("None.")
     return parts
 
 

@@ -60,19 +60,7 @@ def write_json(document: dict[str, Any], path: Path) -> None:
 
 
 def write_page(parts: Sequence[str], folder: Path) -> Path:
-    """Write ``report.md`` into an existing folder.
-
-    Parameters
-    ----------
-    parts : sequence of str
-        Headings, paragraphs, tables and pictures, in Markdown.
-    folder : Path
-        An earlier report in it is replaced.
-
-    Returns
-    -------
-    Path
-        ``report.md``, absolute.
+    """Write ``report.md`` from parts in Markdown into an existing folder; return its absolute path.
 
     Raises
     ------

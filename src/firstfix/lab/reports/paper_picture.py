@@ -67,25 +67,7 @@ class Shown:
 
 
 def draw_starts(shown: Shown, path: Path) -> Path:
-    """Draw the first and the last scan where each way of starting believed the robot to be.
-
-    Parameters
-    ----------
-    shown : Shown
-        The drive.
-    path : Path
-        Where the picture goes; its suffix names the format: .png, .svg or .pdf.
-
-    Returns
-    -------
-    Path
-        The file, absolute.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written, or matplotlib is not installed.
-    """
+    """Draw the first and the last scan at the estimate of each kind of start; see `save_figure`."""
     attempts = {attempt.start: attempt for attempt in shown.attempts}
     panels = [(start, when) for start, when in _PANELS if start in attempts]
     shape = shown.grid.height / shown.grid.width
@@ -142,7 +124,7 @@ def _title(start: Start, belief: Belief, began_s: float) -> str:
     if belief.stamp == began_s:
         when = f"{start.value}, first scan"
     if belief.T_map_base is None:
-        return f"{when}:\nnot said"
+        return f"{when}:\nno estimate"
     error = PoseError.between(belief.T_map_base, belief.truth)
     sure = "sure" if belief.sure else "not sure"
     return f"{when}:\n{error.metres:.2f} m {math.degrees(error.radians):.0f}° off, {sure}"

@@ -1,4 +1,4 @@
-"""What was claimed against what came true, and how much is answered at how little risk."""
+"""Picture of calibration, and of coverage against risk."""
 
 from __future__ import annotations
 
@@ -20,25 +20,7 @@ _LEAST_COVERAGE = 0.4
 
 
 def save_reliability(entries: Sequence[Row], path: Path) -> Path:
-    """Draw a reliability diagram and risk-coverage curves.
-
-    Parameters
-    ----------
-    entries : sequence of mapping
-        From `reliability_document`; methods that always claim 1 are a point each.
-    path : Path
-        Where the picture goes; its suffix names the format: .png, .svg or .pdf.
-
-    Returns
-    -------
-    Path
-        The file, absolute.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written, or matplotlib is not installed.
-    """
+    """Draw a reliability diagram and risk-coverage curves of a document; see `save_figure`."""
     figure = new_figure(11.0, 5.0)
     diagram, curves = figure.subplots(1, 2)
     for entry, colour in zip(entries, PALETTE, strict=False):

@@ -1,4 +1,4 @@
-"""A picture of a robot's story: where it was, and where it was said to be."""
+"""A picture of the demo: true and published poses."""
 
 from __future__ import annotations
 
@@ -19,27 +19,7 @@ LETTERING_IN = 1.2
 
 
 def draw_scenario(grid: OccupancyGrid, steps: Sequence[DemoStep], path: Path) -> Path:
-    """Draw a story into a file.
-
-    Parameters
-    ----------
-    grid : OccupancyGrid
-        The map.
-    steps : sequence of DemoStep
-        At least one.
-    path : Path
-        Where the picture goes; its suffix names the format: .png, .svg or .pdf.
-
-    Returns
-    -------
-    Path
-        The file, absolute.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written, or matplotlib is not installed.
-    """
+    """Draw the true and the published poses of a demo, at least one step; see `save_figure`."""
     wide, high = grid.width * grid.resolution, grid.height * grid.resolution
     scale = LONG_SIDE_IN / max(wide, high)
     figure = new_figure(scale * wide, scale * high + LETTERING_IN)

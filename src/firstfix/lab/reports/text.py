@@ -10,6 +10,9 @@ from firstfix.core.se2 import SE2
 
 Row = Mapping[str, Any]
 
+# Cells of nothing but these are numbers, which stand to the right.
+_NUMERIC = frozenset("0123456789.,-–%/ ")
+
 
 def pose_text(pose: SE2) -> str:
     """Write a pose for a person."""
@@ -19,21 +22,16 @@ def pose_text(pose: SE2) -> str:
 def columns_table(
     rows: Sequence[Row], words: Mapping[str, str], columns: Sequence[tuple[str, str, str]]
 ) -> str:
-    """Lay out rows of figures.
+    """Lay out rows of figures in Markdown; None becomes a dash.
 
     Parameters
     ----------
     rows : sequence of mapping
-        Figures by key; None is shown as a dash.
+        Figures by key.
     words : mapping
         Title to key of the columns of words, which come first.
     columns : sequence of tuple
         Title, key and format of each column of figures.
-
-    Returns
-    -------
-    str
-        Markdown.
     """
     cells = [
         [
@@ -49,10 +47,7 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Lay out a table in Markdown: words to the left, numbers to the right."""
     # A rule of Markdown needs three characters.
     widths = [max(3, *map(len, column)) for column in zip(head, *rows, strict=True)]
-    numeric = [
-        all(not row[i] or row[i].lstrip("-")[:1].isdigit() or row[i] == "–" for row in rows)
-        for i in range(len(head))
-    ]
+    numeric = [all(set(row[i]) <= _NUMERIC for row in rows) for i in range(len(head))]
     rule = [
         "-" * (width - 1) + ":" if right else "-" * width
         for width, right in zip(widths, numeric, strict=True)

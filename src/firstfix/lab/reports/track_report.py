@@ -96,29 +96,7 @@ def trajectory_of(tracked: Sequence[TrackedScan]) -> Trajectory:
 
 
 def draw_track(grid: OccupancyGrid, tracked: Sequence[TrackedScan], path: Path, title: str) -> Path:
-    """Draw a tracked drive into a file.
-
-    Parameters
-    ----------
-    grid : OccupancyGrid
-        The map.
-    tracked : sequence of TrackedScan
-        At least one.
-    path : Path
-        Where the picture goes; its suffix names the format: .png, .svg or .pdf.
-    title : str
-        What stands above it.
-
-    Returns
-    -------
-    Path
-        The file, absolute.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written, or matplotlib is not installed.
-    """
+    """Draw a tracked drive of at least one scan into a file; see `save_figure`."""
     track = np.array([scan.T_map_base.as_array()[:2] for scan in tracked])
     points = end_points(tracked)
     west, south, east, north = _view(np.concatenate([track, points]), track)
@@ -174,7 +152,7 @@ def _draw_paths(axes: Axes, tracked: Sequence[TrackedScan]) -> None:
         (track, BLUE, 1.2, "tracked"),
     ):
         if np.isfinite(poses).any():
-            # A row of NaN ends a line: nobody drove across a gap.
+            # A row of NaN ends a line, so that gaps between runs stay open.
             x, y = np.insert(poses, breaks, np.nan, axis=0).T
             axes.plot(x, y, color=colour, lw=width, label=label, zorder=3)
 

@@ -1,4 +1,4 @@
-"""The scenario of ``firstfix demo``, and what became of the robot in it."""
+"""The scenario of ``firstfix demo``, and its episodes judged by the truth."""
 
 from __future__ import annotations
 
@@ -133,22 +133,7 @@ class Episode:
 
 
 def run_demo(grid: OccupancyGrid, seed: int, localizer: Localizer) -> Iterator[DemoStep]:
-    """Run the demo in a building, with a new localizer that gets everything the robot reports.
-
-    Parameters
-    ----------
-    grid : OccupancyGrid
-        The building, and the map of it.
-    seed : int
-        Seed of places, noise and wheel slip.
-    localizer : Localizer
-        Gets the map first.
-
-    Yields
-    ------
-    DemoStep
-        One for each scan.
-    """
+    """Run the demo in a building; a new localizer gets the map, then all that the robot reports."""
     localizer.handle(NewMap(0.0, grid))
     episode = 0
     lifted: set[SignalKind] = set()

@@ -1,4 +1,4 @@
-"""What is done to a robot: kidnapped, carried, pushed, or on a floor where its wheels slip."""
+"""Disturbances of a robot: teleported, carried, pushed, or with slipping wheels."""
 
 from __future__ import annotations
 
@@ -23,26 +23,20 @@ from firstfix.lab.simulation.simulation import (
 from firstfix.lab.simulation.sweep import NOBODY
 from firstfix.lab.worlds.catalog import random_free_pose
 
-_SWAY_RAD = 1.5  # how far a robot turns to and fro in somebody's hands
+_SWAY_RAD = 1.5  # amplitude of the sway of a carried robot
 
 
 class Grip(Enum):
-    """What the sensor of a carried robot sees of who carries it."""
+    """What the sensor of a carried robot sees of the carrier."""
 
     OPEN = "open"  # nothing: it is held from below
     HANDS = "hands"  # two hands, and a body behind
-    COVERED = "covered"  # something near, whichever way it looks
+    COVERED = "covered"  # something near in every direction
 
 
 @dataclass(frozen=True, slots=True)
 class Teleport(Phase):
-    """The robot is somewhere else all of a sudden, and neither wheels nor signals say so.
-
-    Parameters
-    ----------
-    to : SE2 or None
-        ``T_map_base`` afterwards; None for a random free place.
-    """
+    """Move the robot to a pose (None: a random free one) with no signal from wheels or sensors."""
 
     to: SE2 | None = None
 
@@ -52,7 +46,7 @@ class Teleport(Phase):
         return () if self.to is None else (self.to,)
 
     def run(self, simulation: Simulation) -> Iterator[Moment]:
-        """Move it between two scans."""
+        """Move the robot between two scans."""
         simulation.robot.place(_somewhere(simulation) if self.to is None else self.to)
         simulation.disturbed(Disturbance.TELEPORTED)
         yield from ()
@@ -60,19 +54,19 @@ class Teleport(Phase):
 
 @dataclass(frozen=True, slots=True)
 class CarryTo(Phase):
-    """Somebody lifts the robot, carries it to a place and sets it down.
+    """A person lifts the robot, carries it to a pose and sets it down.
 
-    Its wheels drop and count nothing. It turns to and fro on the way: the one that it would drive,
-    or a straight one if it could not.
+    The wheels drop and count nothing. The robot sways while it is carried along the path that it
+    would drive, or along a straight line if there is no path.
 
     Parameters
     ----------
     to : SE2 or None
-        ``T_map_base`` afterwards; None for a random free place.
+        ``T_map_base`` afterwards; None for a random free pose.
     seconds : float
-        How long it is off the floor, s, at least one scan.
+        Time off the floor, s, at least one scan.
     grip : Grip
-        What its sensor sees meanwhile.
+        What the sensor sees meanwhile.
     """
 
     to: SE2 | None = None
@@ -106,7 +100,7 @@ class CarryTo(Phase):
 
 
 class SlipKind(Enum):
-    """Which of the two, robot and wheels, moved without the other."""
+    """What moved alone: the robot, or its wheels."""
 
     PUSHED = "pushed"  # the robot, aside or ahead, until it meets a wall
     SPINNING = "spinning"  # the wheels, forwards
@@ -114,16 +108,16 @@ class SlipKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Slip(Phase):
-    """Odometry and motion part: somebody kicks the robot, or its wheels turn on the spot.
+    """Odometry and motion disagree: the robot is pushed, or its wheels spin.
 
     Parameters
     ----------
     metres, degrees : float
-        How far they part.
+        Size of the disagreement.
     kind : SlipKind
-        Which of the two moved.
+        What moved.
     seconds : float
-        How long this takes, s, at least one scan.
+        Duration, s, at least one scan.
     """
 
     metres: float = 0.5
@@ -132,7 +126,7 @@ class Slip(Phase):
     seconds: float = 0.5
 
     def run(self, simulation: Simulation) -> Iterator[Moment]:
-        """Slip a little with every tick."""
+        """Slip by a small step with every tick."""
         steps = max(1, periods(self.seconds))
         ticks = round(steps * PERIOD_S * ODOMETRY_HZ)
         length, turn = self.metres / ticks, math.radians(self.degrees) / ticks
@@ -159,7 +153,7 @@ def _ring() -> NDArray[np.float64]:
     return np.column_stack([0.3 * np.cos(bearings), 0.3 * np.sin(bearings), np.full(12, 0.1)])
 
 
-# Circles beside the robot: x, y in the base frame, radius; m.
+# Circles around the robot: x, y in the base frame, radius; m.
 _HANDS: dict[Grip, NDArray[np.float64]] = {
     Grip.OPEN: NOBODY,
     Grip.HANDS: np.array([[0.0, 0.2, 0.05], [0.0, -0.2, 0.05], [-0.4, 0.0, 0.2]]),

@@ -1,4 +1,4 @@
-"""What happens to the simulated robots of ``firstfix bench --kidnap``."""
+"""The scenarios of ``firstfix bench --kidnap``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from firstfix.lab.scenarios.phases import (
     Wander,
 )
 
-# Time after a disturbance, s: 10 s of right poses must have room in it, and a search before them.
+# Time after a disturbance, s: enough for a search and 10 s of right poses.
 AFTER_S = 25.0
 _STARTING_S = 2.0
 _BEFORE_S = 12.0
@@ -30,19 +30,9 @@ _ABOUT = 12
 
 
 def scripted(seed: int, after_s: float = AFTER_S) -> tuple[str, list[Phase]]:
-    """Choose kind and script of a scenario.
+    """Return the kind of a scenario and its phases.
 
-    Parameters
-    ----------
-    seed : int
-        Kinds take turns from seed to seed.
-    after_s : float
-        Time after each disturbance, s.
-
-    Returns
-    -------
-    tuple of str and list of Phase
-        The kind, and what happens.
+    The kinds alternate from seed to seed; ``after_s`` is the time after each disturbance.
     """
     kind = list(_SCRIPTS)[seed % len(_SCRIPTS)]
     return kind, [Stand(_STARTING_S), *_SCRIPTS[kind](seed // len(_SCRIPTS), after_s)]

@@ -1,4 +1,4 @@
-"""What a robot does: it stands, drives, turns, with or without people about it."""
+"""Motions of a robot: it stands, drives and turns, with or without people around it."""
 
 from __future__ import annotations
 
@@ -19,13 +19,7 @@ _SPIN_RADPS = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Stand(Phase):
-    """The robot stands still.
-
-    Parameters
-    ----------
-    seconds : float
-        How long, s.
-    """
+    """Stand still for a time (s)."""
 
     seconds: float
 
@@ -37,13 +31,7 @@ class Stand(Phase):
 
 @dataclass(frozen=True, slots=True)
 class Pause(Phase):
-    """The robot stands still and reports nothing: time passes without a scan or odometry.
-
-    Parameters
-    ----------
-    seconds : float
-        How long, s.
-    """
+    """Stand still for a time (s), without a scan, odometry or a signal."""
 
     seconds: float
 
@@ -55,15 +43,14 @@ class Pause(Phase):
 
 @dataclass(frozen=True, slots=True)
 class DriveTo(Phase):
-    """The robot drives to a goal along a planned way and stops there.
+    """Drive to a goal along a planned path and stop there.
 
     Parameters
     ----------
     to : SE2 or None
-        The goal in the map frame (its heading does not count); None for a random one that can be
-        reached.
+        The goal in the map frame (its heading is ignored); None for a random reachable one.
     seconds : float
-        When to give up, s.
+        Time limit, s.
     """
 
     to: SE2 | None = None
@@ -96,13 +83,7 @@ class DriveTo(Phase):
 
 @dataclass(frozen=True, slots=True)
 class Wander(Phase):
-    """The robot drives from one random goal to the next.
-
-    Parameters
-    ----------
-    seconds : float
-        How long, s.
-    """
+    """Drive from one random goal to the next for a time (s)."""
 
     seconds: float
 
@@ -118,13 +99,7 @@ class Wander(Phase):
 
 @dataclass(frozen=True, slots=True)
 class Spin(Phase):
-    """The robot turns on the spot.
-
-    Parameters
-    ----------
-    radians : float
-        How far, rad; positive is to the left, and more than a full turn is fine.
-    """
+    """Turn on the spot by an angle (rad, positive to the left, any size)."""
 
     radians: float
 
@@ -138,16 +113,16 @@ class Spin(Phase):
 
 @dataclass(frozen=True, slots=True)
 class Crowd(Phase):
-    """People come to the robot, which stands still for a while, and stay until the next crowd.
+    """People come to the robot, which stands still for a while; they stay until the next crowd.
 
     Parameters
     ----------
     count : int
-        How many; 0 sends all away. Fewer come where there is no place for so many.
+        Number of people; fewer come if there is no room. 0 removes all.
     seconds : float
-        How long the robot stands, s; with 0 the next phase has the crowd about it at once.
+        How long the robot stands, s.
     manner : Manner
-        Whether they surround it and go with it, or walk about.
+        Whether they surround it and move with it, or walk about.
     """
 
     count: int

@@ -14,11 +14,11 @@ class Phase(ABC):
 
     @abstractmethod
     def run(self, simulation: Simulation) -> Iterator[Moment]:
-        """Move the stage on to the end of the phase, scan by scan; a phase may take no time."""
+        """Run the phase to its end, scan by scan; a phase may take no time."""
 
     @property
     def places(self) -> tuple[SE2, ...]:
-        """Where the robot will stand because the script says so: no furniture comes there."""
+        """Poses of the robot that the script names; no furniture is placed there."""
         return ()
 
 

@@ -1,4 +1,4 @@
-"""Scripts of what happens to a robot, and what it reports meanwhile."""
+"""Scenarios: scripts of phases, and the reports of the robot meanwhile."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ def _usual_lidar() -> Lidar:
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """A script; with a map and a seed it always plays the same.
+    """A script; with a map and a seed it is deterministic.
 
     Parameters
     ----------
     phases : sequence of Phase
-        What happens, one after another.
+        What happens, in order.
     start : SE2 or None
-        ``T_map_base`` at first; None for a random free place.
+        First ``T_map_base``; None for a random free pose.
     kobuki : Kobuki
         The robot.
     lidar : Lidar
-        Its sensor, a few centimetres before its middle by default.
+        Its sensor, by default a few centimetres before its centre.
     shutter : Shutter
-        Whether motion skews its scans.
+        Whether motion skews the scans.
     furniture : int
         Boxes in the building that are not in the map.
     """
@@ -52,26 +52,12 @@ class Scenario:
 
 
 def run(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Iterator[Moment]:
-    """Play a scenario.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The script.
-    grid : OccupancyGrid
-        The map of the building.
-    seed : int
-        Where chance begins.
-
-    Yields
-    ------
-    Moment
-        One for every scan, 10 a second.
+    """Run a scenario in a building and yield one `Moment` for every scan, 10 a second.
 
     Raises
     ------
     InputError
-        If the robot shall begin, or be put, where it does not fit, or drive where no way leads.
+        If the robot does not fit where the script puts it, or no path leads to a goal.
     """
     simulation = start_simulation(scenario, grid, seed)
     for phase in scenario.phases:
@@ -79,26 +65,12 @@ def run(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Iterator[Moment]:
 
 
 def start_simulation(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Simulation:
-    """Prepare a scenario: the robot stands at its beginning, and nothing has happened yet.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The script; its phases tell where there must be no furniture.
-    grid : OccupancyGrid
-        The map of the building.
-    seed : int
-        Where chance begins.
-
-    Returns
-    -------
-    Simulation
-        Ready to be played on.
+    """Prepare a scenario: the robot stands at its start, and no phase has run yet.
 
     Raises
     ------
     InputError
-        As `run`.
+        If the robot does not fit where the script puts it.
     """
     for_building, for_simulation = np.random.SeedSequence(seed).spawn(2)
     rng = np.random.default_rng(for_building)

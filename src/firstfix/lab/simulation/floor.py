@@ -19,12 +19,9 @@ _SAMPLE_M = 0.05  # along lines; nothing that stops a robot is much thinner
 
 @dataclass(frozen=True, eq=False)
 class Floor:
-    """The world of the simulation, furniture included.
+    """The simulated world: a grid with walls and furniture.
 
-    Parameters
-    ----------
-    grid : OccupancyGrid
-        Walls and furniture. Rays end at occupied cells; a robot keeps to cells seen free.
+    Rays end at occupied cells. A robot keeps to free cells.
     """
 
     grid: OccupancyGrid
@@ -36,7 +33,7 @@ class Floor:
 
     @cached_property
     def room(self) -> NDArray[np.float32]:
-        """Distance to what is not free, shape (height, width), m; 0 where nobody can stand."""
+        """Distance to what is not free, shape (height, width), m; 0 where no robot can stand."""
         # Beyond the border of the map nothing is known to be free.
         blocked = np.pad(~self.grid.seen_free, 1, constant_values=True)
         cells = euclidean_distance(blocked)[1:-1, 1:-1]

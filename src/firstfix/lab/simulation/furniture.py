@@ -1,4 +1,4 @@
-"""Furniture that came after the map was made."""
+"""Furniture that is not in the map."""
 
 from __future__ import annotations
 
@@ -14,29 +14,15 @@ from firstfix.lab.simulation.floor import Floor
 
 _SIDES_M = (0.3, 0.9)
 _TRIES = 50
-_PASSAGE_M = 0.5  # left free all around a piece: it blocks a view, never a way
+_PASSAGE_M = 0.5  # kept free around a piece: it blocks a view, never a path
 
 
 def furnished(
     grid: OccupancyGrid, count: int, rng: np.random.Generator, keep_free: Sequence[SE2] = ()
 ) -> OccupancyGrid:
-    """Put boxes into a building.
+    """Return the map with up to ``count`` boxes that the robot's own map does not have.
 
-    Parameters
-    ----------
-    grid : OccupancyGrid
-        The map without them.
-    count : int
-        How many; fewer are put where there is no place for all.
-    rng : numpy.random.Generator
-        Source of their sizes and places.
-    keep_free : sequence of SE2
-        Places in the map frame where a robot will stand.
-
-    Returns
-    -------
-    OccupancyGrid
-        A map with them: what the robot meets, not what it knows.
+    No box is placed at the poses ``keep_free`` (map frame), where a robot will stand.
     """
     room = Floor(grid).room
     cells = grid.cells.copy()

@@ -1,4 +1,4 @@
-"""A LIDAR that looks at a map instead of at the world."""
+"""A simulated LIDAR that measures a map."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Lidar:
     T_base_laser : SE2
         Pose of the sensor on the robot.
     mounting : Mounting
-        Which way up it sits.
+        Upright or upside down.
 
     Raises
     ------
@@ -100,7 +100,7 @@ class Lidar:
         Returns
         -------
         LaserScan
-            What the sensor says; inf where it got no return.
+            The scan; inf for beams without return.
         """
         as_instance(OccupancyGrid, grid, "grid")
         T_map_laser = as_pose(T_map_base, "T_map_base") @ self.T_base_laser
@@ -115,21 +115,16 @@ class Lidar:
     def measure(
         self, true: NDArray[np.float64], rng: np.random.Generator, stamp: float
     ) -> LaserScan:
-        """Make a scan of true ranges.
+        """Return the scan that this sensor measures, given the true ranges.
 
         Parameters
         ----------
         true : ndarray, shape (beams,)
-            What an ideal sensor measures, m; inf where nothing is within reach.
+            Ranges of an ideal sensor, m; inf where nothing is within range.
         rng : numpy.random.Generator
             Source of noise and dropouts.
         stamp : float
             Time of the scan, s.
-
-        Returns
-        -------
-        LaserScan
-            What this sensor says; inf where it got no return.
         """
         measured = true + self.sigma_m * rng.standard_normal(self.beams)
         lost = rng.random(self.beams) < self.dropout

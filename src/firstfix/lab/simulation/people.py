@@ -1,4 +1,4 @@
-"""People about the robot: they walk, or stand around it and go where it goes."""
+"""People around the robot: they walk about, or surround it and move with it."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from firstfix.lab.simulation.floor import Floor
 RADIUS_M = (0.2, 0.25)
 """From slim to stout at the height of the sensor, m."""
 
-_AROUND_M = (0.6, 1.3)  # those who surround a robot stand so near
-_ABOUT_M = 5.0  # those who walk stay in its neighbourhood
+_AROUND_M = (0.6, 1.3)  # distance of people who surround the robot
+_ABOUT_M = 5.0  # people who walk stay within this distance
 _PACE_MPS = (0.6, 1.2)
-_GAP_M = 0.35  # between the middle of the robot and the nearest skin
-_SHOULDER_M = 0.25  # from the middle of a person to a wall
+_GAP_M = 0.35  # between the centre of the robot and a person
+_SHOULDER_M = 0.25  # from the centre of a person to a wall
 _TRIES = 20
 
 
@@ -36,19 +36,11 @@ class _Person:
     y: float
     radius: float
     pace: float
-    wish: tuple[float, float]  # a point of the map, or a place beside the robot; m
+    wish: tuple[float, float]  # a point of the map, or a place relative to the robot; m
 
 
 class People:
-    """All people on a floor.
-
-    Parameters
-    ----------
-    floor : Floor
-        Where they walk.
-    rng : numpy.random.Generator
-        Source of their whims.
-    """
+    """All people on a floor; their goals are random."""
 
     def __init__(self, floor: Floor, rng: np.random.Generator) -> None:
         self._floor = floor
@@ -65,16 +57,9 @@ class People:
         return np.array([(p.x, p.y, p.radius) for p in self._all]).reshape(-1, 3)
 
     def come(self, count: int, manner: Manner, T_map_base: SE2) -> None:
-        """Send away who is there and let others come.
+        """Replace all people by new ones.
 
-        Parameters
-        ----------
-        count : int
-            How many; fewer come where there is no place for so many in sight of the robot.
-        manner : Manner
-            What they do.
-        T_map_base : SE2
-            Where the robot is.
+        Fewer than ``count`` come if there is no room for all in sight of the robot.
         """
         self._manner = manner
         self._all = []
@@ -85,7 +70,7 @@ class People:
                 self._all.append(person)
 
     def walk(self, T_map_base: SE2, seconds: float) -> None:
-        """Let them go on for a short time (s) while the robot is at ``T_map_base``."""
+        """Move all people for a short time (s) while the robot is at ``T_map_base``."""
         for person in self._all:
             if self._manner is Manner.SURROUND:
                 x, y = T_map_base.x + person.wish[0], T_map_base.y + person.wish[1]
@@ -95,7 +80,7 @@ class People:
             self._step(person, x, y, person.pace * seconds)
             _make_way(person, T_map_base)
             nearer = before - math.hypot(x - person.x, y - person.y)
-            # Who has arrived, or stands before a wall or the robot, changes their mind.
+            # A person who has arrived or is blocked gets a new goal.
             if self._manner is Manner.WALK and nearer < person.pace * seconds / 4.0:
                 person.wish = self._next_goal(person, T_map_base)
 
@@ -140,7 +125,7 @@ class People:
 
 
 def _make_way(person: _Person, T_map_base: SE2) -> None:
-    """Step aside: a robot that drives runs over nobody's feet."""
+    """Step aside, so that a driving robot hits nobody."""
     dx, dy = person.x - T_map_base.x, person.y - T_map_base.y
     away, least = math.hypot(dx, dy), _GAP_M + person.radius
     if away < least:

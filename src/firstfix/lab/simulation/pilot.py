@@ -1,4 +1,4 @@
-"""Keeping a robot on its way: pure pursuit of a point that runs ahead."""
+"""Path following: pure pursuit of a point ahead on the path."""
 
 from __future__ import annotations
 
@@ -11,26 +11,18 @@ from firstfix.core.se2 import SE2
 
 CRUISE_MPS = 0.4
 
-_AHEAD_M = 0.35  # nearer than this a robot swings about its way, farther it cuts corners
+_AHEAD_M = 0.35  # nearer: the robot oscillates; farther: it cuts corners
 _SPACING_M = 0.05
 _ARRIVED_M = 0.08
 _TURN_FIRST_RAD = 0.7  # a corner as sharp as this is turned on the spot
-_GAIN = 2.5  # turn asked for, rad/s for each rad beside the point ahead
+_GAIN = 2.5  # turn rate, rad/s for each rad off the point ahead
 _BRAKE_MPS2 = 0.4
 _SLOWEST_MPS = 0.06
-_LOOK_BACK = 20  # points; where a way crosses itself the nearest one could be the wrong one
+_LOOK_BACK = 20  # points; where a path crosses itself, the nearest point may be wrong
 
 
 class Pilot:
-    """Follows one path.
-
-    Parameters
-    ----------
-    path : ndarray, shape (n, 2)
-        Corners of the path in the map frame, m.
-    cruise_mps : float
-        Speed on straight parts, m/s.
-    """
+    """Follows a path, shape (n, 2), corners in the map frame, at a cruising speed (m, m/s)."""
 
     def __init__(self, path: NDArray[np.float64], cruise_mps: float = CRUISE_MPS) -> None:
         lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
@@ -42,18 +34,7 @@ class Pilot:
         self.arrived = False
 
     def command(self, T_map_base: SE2) -> tuple[float, float]:
-        """Say how to go on.
-
-        Parameters
-        ----------
-        T_map_base : SE2
-            Where the robot is.
-
-        Returns
-        -------
-        tuple of float
-            Speed forward, m/s, and turn, rad/s; both 0 from arrival on.
-        """
+        """Return the forward speed (m/s) and the turn rate (rad/s); both are 0 after arrival."""
         x, y = T_map_base.x, T_map_base.y
         window = slice(self._nearest, self._nearest + _LOOK_BACK)
         away = np.hypot(self._x[window] - x, self._y[window] - y)

@@ -18,21 +18,21 @@ COMFORT_M = 0.45
 
 # Doors are some 0.8 m wide; cells of this side leave two or three in them.
 _CELL_M = 0.1
-# A step right beside a wall costs as much as a detour this many times as long.
+# A step next to a wall costs as much as a detour this many times as long.
 _FEAR = 10.0
-# A robot that was put between table legs begins at the nearest place within this way.
+# A robot between table legs begins at the nearest suitable place within this distance.
 _TO_BEGINNING_M = 1.0
 
 
 class Planner:
-    """Plans ways on one floor, on cells of about 0.1 m.
+    """Plans paths on one floor, on cells of about 0.1 m.
 
     Parameters
     ----------
     floor : Floor
         Walls and furniture.
     tightest_m : float
-        Least room around the robot's middle, m: its radius and a little.
+        Least room around the robot's centre, m: its radius and a margin.
     """
 
     def __init__(self, floor: Floor, tightest_m: float) -> None:
@@ -56,22 +56,17 @@ class Planner:
         return weights.astype(np.float32)
 
     def path(self, start: SE2, goal: SE2) -> NDArray[np.float64]:
-        """Plan a way.
-
-        Parameters
-        ----------
-        start, goal : SE2
-            Places in the map frame; headings do not count.
+        """Plan a path between two places in the map frame; headings are ignored.
 
         Returns
         -------
         ndarray, shape (n, 2)
-            Corners of the way in the map frame, m, both ends included.
+            Corners of the path in the map frame, m, both ends included.
 
         Raises
         ------
         InputError
-            If there is no way, or the robot fits at neither end.
+            If there is no path, or the robot does not fit at an end.
         """
         costs = self._costs_from(start)
         row, column = self._cell_near(goal)
@@ -87,19 +82,9 @@ class Planner:
         return self._shortened(way)
 
     def random_goal(self, start: SE2, rng: np.random.Generator) -> SE2:
-        """Draw a place that can be reached, evenly over those with comfortable room if there are.
+        """Draw a reachable pose in the map frame, uniformly over the places with comfortable room.
 
-        Parameters
-        ----------
-        start : SE2
-            Where the robot is, in the map frame.
-        rng : numpy.random.Generator
-            Source of chance.
-
-        Returns
-        -------
-        SE2
-            The place, and a heading to have there.
+        If no place has comfortable room, any reachable place is drawn.
         """
         reached = np.isfinite(self._costs_from(start))
         comfortable = reached & (self.weights <= 1.0)
@@ -134,7 +119,7 @@ class Planner:
         return int(rows[nearest]) + low_row, int(columns[nearest]) + low_column
 
     def _shortened(self, way: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Leave out corners where the straight line has as much room as the way had."""
+        """Leave out corners where the straight line has as much room as the path."""
         corners = way.tolist()
         room = np.array([min(self._floor.room_at(x, y), COMFORT_M) for x, y in corners])
         kept = [0]

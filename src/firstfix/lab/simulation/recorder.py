@@ -14,18 +14,9 @@ from firstfix.lab.simulation.simulation import Moment
 
 
 def record(moments: Iterable[Moment]) -> Recording:
-    """Keep what a robot reported, with the truth at each scan.
+    """Collect what a robot reported, with the true pose at each scan, as one drive.
 
-    Parameters
-    ----------
-    moments : iterable of Moment
-        From `firstfix.lab.scenarios.scenario.run`, with at least one scan.
-
-    Returns
-    -------
-    Recording
-        One drive, even if the robot was carried in between: who follows it is not told so. The
-        notes say when that was; signals are not kept.
+    The notes say when the robot was disturbed. Signals are not kept.
 
     Raises
     ------

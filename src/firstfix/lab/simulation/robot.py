@@ -1,4 +1,4 @@
-"""A small robot with two wheels, a bumper, and sensors that notice when it is lifted."""
+"""A small robot with two wheels, a bumper, and wheel-drop and cliff sensors."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PUSH_STEP_M = 0.01  # a push ends at the first wall; steps this short cannot ju
 
 @dataclass(frozen=True, slots=True)
 class Kobuki:
-    """What a Kobuki is and can; it has no gyro here, its wheels are all it counts by.
+    """The parameters of a Kobuki without a gyro: odometry comes from its wheels alone.
 
     Parameters
     ----------
@@ -25,11 +25,11 @@ class Kobuki:
     base_m : float
         Distance between the wheels, m.
     v_max, w_max : float
-        Limits of its speed, m/s and rad/s.
+        Limits of speed, m/s and rad/s.
     a_max, alpha_max : float
         Limits of acceleration, m/s² and rad/s².
     wheels : WheelErrors
-        How wrong its wheels count.
+        Errors of the wheels.
     """
 
     radius_m: float = 0.18
@@ -42,19 +42,7 @@ class Kobuki:
 
 
 class Robot:
-    """One robot on a floor: where it is, and where its wheels say that it is.
-
-    Parameters
-    ----------
-    kobuki : Kobuki
-        What it is.
-    floor : Floor
-        Where it moves; walls stop it.
-    T_map_base : SE2
-        Where it stands at first.
-    rng : numpy.random.Generator
-        Source of the errors of its wheels.
-    """
+    """One robot on a floor: its true pose, and its odometry; walls stop it."""
 
     def __init__(
         self, kobuki: Kobuki, floor: Floor, T_map_base: SE2, rng: np.random.Generator
@@ -71,23 +59,18 @@ class Robot:
 
     @property
     def bumped(self) -> bool:
-        """True from when the robot met a wall until it has moved away."""
+        """True from the contact with a wall until the robot has moved away."""
         return self._sensed[SignalKind.BUMPER]
 
     @property
     def lifted(self) -> bool:
-        """True while somebody holds the robot."""
+        """True while the robot is off the floor."""
         return self._sensed[SignalKind.WHEEL_DROP]
 
     def drive(self, v: float, w: float, seconds: float) -> None:
-        """Go on for a short time, as fast as asked for if the motors can.
+        """Drive for a short time, at the requested speed (m/s, rad/s) if the motors permit it.
 
-        Parameters
-        ----------
-        v, w : float
-            Speed asked for, m/s and rad/s.
-        seconds : float
-            How long, s; short enough that the speed is one.
+        The time must be short enough that the speed is constant.
         """
         if self.lifted:
             return
@@ -95,7 +78,7 @@ class Robot:
         self.v = _towards(self.v, _limited(v, k.v_max), k.a_max * seconds)
         self.w = _towards(self.w, _limited(w, k.w_max), k.alpha_max * seconds)
         if not self._move(arc(self.v * seconds, self.w * seconds)):
-            # Against a wall a round robot can still turn.
+            # A round robot can still turn at a wall.
             self._sensed[SignalKind.BUMPER] = True
             self.v = 0.0
             self._move(SE2(0.0, 0.0, self.w * seconds))
@@ -108,7 +91,7 @@ class Robot:
         self.T_odom_base = self.T_odom_base @ self._wheels.count(length, turn)
 
     def push(self, T_base_pushed: SE2) -> None:
-        """Shove the robot, up to the first wall; its wheels, dragged sideways, count nothing."""
+        """Push the robot, up to the first wall; its wheels count nothing."""
         steps = max(1, round(SE2.identity().distance_to(T_base_pushed) / _PUSH_STEP_M))
         across = SE2(T_base_pushed.x / steps, T_base_pushed.y / steps, 0.0)
         for _ in range(steps):
@@ -117,12 +100,12 @@ class Robot:
         self._move(SE2(0.0, 0.0, T_base_pushed.yaw))
 
     def place(self, T_map_base: SE2) -> None:
-        """Put the robot somewhere else, at rest; its wheels count nothing."""
+        """Put the robot elsewhere, at rest; its wheels count nothing."""
         self.T_map_base = T_map_base
         self.v = self.w = 0.0
 
     def lift(self) -> None:
-        """Take the robot off the floor: its wheels drop, the floor is out of sight."""
+        """Take the robot off the floor: wheel-drop and cliff sensors report it."""
         self._hold(lifted=True)
 
     def set_down(self) -> None:
@@ -130,7 +113,7 @@ class Robot:
         self._hold(lifted=False)
 
     def signals(self, stamp: float) -> tuple[Signal, ...]:
-        """Tell which sensors began or ceased to report since this was last asked; stamp in s."""
+        """Return the sensors that changed since the last call; stamp in s."""
         changed = tuple(
             Signal(stamp, kind, active)
             for kind, active in self._sensed.items()
@@ -145,11 +128,11 @@ class Robot:
         self._sensed[SignalKind.BUMPER] = False
 
     def _move(self, T_before_after: SE2) -> bool:
-        """Move the body if there is room for it, and tell whether there was."""
+        """Move the body if there is room for it; return whether there was."""
         here = self.T_map_base
         there = here @ T_before_after
         room = self._floor.room_at(there.x, there.y)
-        # Where it was put too near a wall, it may still leave.
+        # A robot that stands too near a wall may leave it.
         if room < self.kobuki.radius_m and room < self._floor.room_at(here.x, here.y):
             return False
         self.T_map_base = there

@@ -1,4 +1,4 @@
-"""Where a scenario plays: the robot, its sensors and the clock, moved on by one scan at a time."""
+"""The simulation: robot, sensors, people and clock, advanced by one scan at a time."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ ODOMETRY_HZ = 50
 PERIOD_S = 1.0 / SCAN_HZ
 
 _STEPS = ODOMETRY_HZ // SCAN_HZ
-# A planned way keeps so much more room than the robot needs, which does not follow it exactly.
+# Extra room of a planned path, because the robot does not follow it exactly.
 _MARGIN_M = 0.05
 
 Command = Callable[[SE2], tuple[float, float]]
-"""From where the robot is (``T_map_base``) to what it shall do: v (m/s) and w (rad/s)."""
+"""A controller: from ``T_map_base`` to the speed v (m/s) and the turn rate w (rad/s)."""
 
 Event = LaserScan | Odometry | Signal
 
@@ -41,7 +41,7 @@ class Shutter(Enum):
 
 
 class Disturbance(Enum):
-    """What happened to a robot that its wheels know nothing about, or too much."""
+    """A motion that the odometry does not report, or that it only reports."""
 
     TELEPORTED = "teleported"
     CARRIED = "carried"
@@ -51,7 +51,7 @@ class Disturbance(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
-    """What a robot reports from one scan to the next, and where it truly is.
+    """The reports of a robot from one scan to the next, and the truth.
 
     Parameters
     ----------
@@ -60,11 +60,11 @@ class Moment:
     events : tuple of LaserScan, Odometry or Signal
         In the order of their stamps; odometry comes before a scan of the same stamp.
     T_map_base : SE2
-        The truth at `stamp`.
+        The true pose at `stamp`.
     phase : str
-        Which phase of the scenario this is, for people.
+        Name of the phase, for people.
     disturbance : Disturbance or None
-        What was over just before `stamp`, if anything.
+        The disturbance that ended just before `stamp`.
     """
 
     stamp: float
@@ -86,22 +86,22 @@ def at_rest(T_map_base: SE2) -> tuple[float, float]:
 
 
 class Simulation:
-    """The state of a running simulation.
+    """The state of a running simulation: robot, sensor, people and clock.
 
     Parameters
     ----------
     floor : Floor
         Walls and furniture.
     kobuki : Kobuki
-        The robot's kind.
+        Parameters of the robot.
     lidar : Lidar
         Its sensor.
     shutter : Shutter
         When the sensor measures its beams.
     T_map_base : SE2
-        Where it stands at first.
+        First pose.
     seed : numpy.random.SeedSequence
-        Source of all chance.
+        Source of all randomness.
     """
 
     def __init__(
@@ -113,12 +113,12 @@ class Simulation:
         T_map_base: SE2,
         seed: np.random.SeedSequence,
     ) -> None:
-        # Streams of their own: another noise of the sensor must not send the robot elsewhere.
-        wheels, beams, script, whims = (np.random.default_rng(child) for child in seed.spawn(4))
+        # Separate streams: a change of the sensor noise must not change the path of the robot.
+        wheels, beams, script, crowd = (np.random.default_rng(child) for child in seed.spawn(4))
         self.floor = floor
         self.robot = Robot(kobuki, floor, T_map_base, wheels)
         self.planner = Planner(floor, kobuki.radius_m + _MARGIN_M)
-        self.people = People(floor, whims)
+        self.people = People(floor, crowd)
         self.rng = script
         self.lidar = lidar
         self._shutter = shutter
@@ -127,27 +127,22 @@ class Simulation:
         self._disturbance: Disturbance | None = None
 
     def disturbed(self, by: Disturbance) -> None:
-        """Note what has just happened, for the next moment."""
+        """Attach a disturbance to the next moment."""
         self._disturbance = by
 
     def step(
         self, phase: str, command: Command = at_rest, hands: NDArray[np.float64] = NOBODY
     ) -> Moment:
-        """Go on to the next scan.
+        """Advance to the next scan.
 
         Parameters
         ----------
         phase : str
-            What this is, for people.
+            Name of the phase, for people.
         command : Command
-            What the robot does meanwhile.
+            The motion of the robot meanwhile.
         hands : ndarray, shape (n, 3)
-            Circles around the robot that go with it: x, y in the base frame, radius; m.
-
-        Returns
-        -------
-        Moment
-            What was reported.
+            Circles that move with the robot: x, y in the base frame, radius; m.
         """
         stamp, T_map_base = self.stamp, self.robot.T_map_base
         circles = np.concatenate(
@@ -173,7 +168,7 @@ class Simulation:
         return self._end(stamp, events, T_map_base, phase)
 
     def step_silently(self, phase: str) -> Moment:
-        """Go on as far, with nothing reported at all."""
+        """Advance as far with nothing reported."""
         stamp, T_map_base = self.stamp, self.robot.T_map_base
         for _ in range(_STEPS):
             self._tick(at_rest)

@@ -1,4 +1,4 @@
-"""Sweeps of a moving sensor among people: beam by beam, each from where it was at its time."""
+"""Scans of a moving sensor among people: each beam starts at the pose of its own time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def sweep(
     circles: NDArray[np.float64] = NOBODY,
     T_map_base_after: SE2 | None = None,
 ) -> LaserScan:
-    """Take one scan.
+    """Take one scan of walls, furniture and people.
 
     Parameters
     ----------
@@ -44,15 +44,9 @@ def sweep(
     stamp : float
         Time of the first beam, s.
     circles : ndarray, shape (n, 3)
-        People and other round things: x, y in the map frame, radius; m.
+        People: x, y in the map frame, radius; m.
     T_map_base_after : SE2 or None
-        Pose of the robot a full turn of the sensor later, where the motion skews the scan; None for
-        a sensor that looks everywhere at once.
-
-    Returns
-    -------
-    LaserScan
-        What the sensor says; inf where it got no return.
+        Pose of the robot one turn of the sensor later, if motion skews the scan.
     """
     resolution = floor.grid.resolution
     bearings = lidar.bearings
@@ -108,7 +102,7 @@ def _cast(
             across = to_x * dy - to_y * dx
             half = radius * radius - across * across
             if half > 0.0 and along + radius > 0.0:
-                # From inside the circle the sensor looks at skin.
+                # A sensor inside the circle measures 0.
                 inside = to_x * to_x + to_y * to_y < radius * radius
                 near = 0.0 if inside else along - math.sqrt(half)
                 if 0.0 <= near < reach:

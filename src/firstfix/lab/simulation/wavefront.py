@@ -14,22 +14,22 @@ _LENGTHS = np.array(  # of a step to each neighbour; staying is none
 
 
 def walking_costs(weights: NDArray[np.float32], row: int, column: int) -> NDArray[np.float32]:
-    """Find the cheapest 8-connected way from one cell to every other.
+    """Find the cheapest 8-connected path from one cell to every other.
 
-    Sweeps over the whole map, to and fro, until nothing becomes cheaper: no queue, and a building
-    needs about as many sweeps as its longest way has bends.
+    Sweeps over the whole map until no cost decreases. This needs no queue, and about as many sweeps
+    as the longest path has bends.
 
     Parameters
     ----------
     weights : ndarray of float32, shape (height, width)
-        Cost of a step into each cell, for every cell of its length; inf where there is no way.
+        Cost of a step into each cell, per cell of length; inf for obstacles.
     row, column : int
-        Where all ways begin.
+        The start.
 
     Returns
     -------
     ndarray of float32, shape (height, width)
-        Cost of the cheapest way; inf where there is none.
+        Cost of the cheapest path; inf where there is none.
     """
     # A rim of walls: kernels need not ask for the border.
     padded = np.pad(weights, 1, constant_values=np.inf)
@@ -75,21 +75,12 @@ def _improve(
 def way_back(
     costs: NDArray[np.float32], weights: NDArray[np.float32], row: int, column: int
 ) -> NDArray[np.int64]:
-    """Go the cheapest way from a cell back to where all ways begin.
-
-    Parameters
-    ----------
-    costs : ndarray of float32, shape (height, width)
-        From `walking_costs`.
-    weights : ndarray of float32, shape (height, width)
-        What they were found with.
-    row, column : int
-        A cell that can be reached.
+    """Follow the cheapest path from a reachable cell back to the start of `walking_costs`.
 
     Returns
     -------
     ndarray of int64, shape (n, 2)
-        Rows and columns from that cell to the beginning, both included.
+        Rows and columns from the cell to the start, both included.
     """
     padded = np.pad(costs, 1, constant_values=np.inf)
     way = [(row, column)]

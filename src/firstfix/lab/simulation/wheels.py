@@ -11,15 +11,15 @@ from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 
 SLIP_M = 0.05
-"""Longest way that a wheel turns on the spot when it slips, m."""
+"""Longest slip of a wheel, m."""
 
 
 @dataclass(frozen=True, slots=True)
 class WheelErrors:
-    """How wrong wheels count; the defaults are those of a small robot on an office floor.
+    """Errors of the wheels; the defaults are those of a small robot on an office floor.
 
-    Two wheels of one make err alike: what they share spoils the length of a way, by what they do
-    not share the robot drifts to a side (0.2 % each are about 0.7° a metre).
+    The shared error scales the length of a path. The individual errors make the robot drift to a
+    side (0.2 % each give about 0.7° a metre).
 
     Parameters
     ----------
@@ -28,7 +28,8 @@ class WheelErrors:
     sigma_uneven : float
         Standard deviation of the scale error of each alone, drawn once a robot.
     sigma_step : float
-        Standard deviation of the noise of a wheel after 1 m, m; it grows with the root of the way.
+        Standard deviation of the noise of a wheel after 1 m, m; it grows with the root of the
+        length.
     slips_per_m : float
         How often a wheel turns up to `SLIP_M` without moving the robot, 1/m.
 
@@ -55,21 +56,11 @@ class WheelErrors:
 
 
 EXACT_WHEELS = WheelErrors(0.0, 0.0, 0.0, 0.0)
-"""Wheels that count what they roll."""
+"""Wheels without errors."""
 
 
 class Wheels:
-    """The two wheels of one robot, with the errors that are its own.
-
-    Parameters
-    ----------
-    errors : WheelErrors
-        How wrong wheels of this make are.
-    base_m : float
-        Distance between the wheels, m.
-    rng : numpy.random.Generator
-        Source of all errors; also of those drawn once.
-    """
+    """The two wheels of one robot; ``rng`` draws their constant errors first."""
 
     def __init__(self, errors: WheelErrors, base_m: float, rng: np.random.Generator) -> None:
         self._errors = errors
@@ -80,18 +71,7 @@ class Wheels:
         self._left, self._right = (1.0 + shared + uneven).tolist()
 
     def count(self, length: float, turn: float) -> SE2:
-        """Tell what the wheels make of one small motion.
-
-        Parameters
-        ----------
-        length, turn : float
-            How far the robot really rolled, m, and turned, rad.
-
-        Returns
-        -------
-        SE2
-            The increment ``T_before_after`` by the wheels.
-        """
+        """Return the increment ``T_before_after`` that the wheels count for a motion (m, rad)."""
         if length == 0.0 and turn == 0.0:
             return SE2.identity()
         half = turn * self._base_m / 2.0

@@ -1,4 +1,4 @@
-"""Drawn buildings: a robot's world without a file."""
+"""The built-in buildings, and random poses in them."""
 
 from __future__ import annotations
 
@@ -24,22 +24,14 @@ ROOM_PITCH = 8.0
 
 
 def identical_rooms(count: int) -> OccupancyGrid:
-    """Draw rooms that no scan from inside can tell apart: one plan, doors closed.
+    """Draw closed rooms of one plan that no scan from inside can distinguish.
 
-    Parameters
-    ----------
-    count : int
-        Number of rooms, at least 1; they stand in a row, `ROOM_PITCH` metres apart.
-
-    Returns
-    -------
-    OccupancyGrid
-        The map; room i begins at x = i · `ROOM_PITCH`.
+    Room i begins at x = i · `ROOM_PITCH`.
 
     Raises
     ------
     InputError
-        If there is no room to draw.
+        If ``count`` is less than 1.
     """
     if count < 1:
         raise InputError(
@@ -66,23 +58,18 @@ def random_free_pose(
 def random_free_poses(
     grid: OccupancyGrid, rng: np.random.Generator, count: int, clearance_m: float = 0.3
 ) -> list[SE2]:
-    """Draw poses where a robot can stand, evenly over the map's free cells and all headings.
+    """Draw ``T_map_base`` of a standing robot, uniformly over free cells and all headings.
 
     Parameters
     ----------
     grid : OccupancyGrid
         The map.
     rng : numpy.random.Generator
-        Source of chance.
+        Source of randomness.
     count : int
         Number of poses.
     clearance_m : float
         Half the side of the square around a pose that must be free, m, up to 254 cells.
-
-    Returns
-    -------
-    list of SE2
-        ``T_map_base`` of each.
 
     Raises
     ------

@@ -15,13 +15,8 @@ _DOOR = 0.9
 def corridor() -> OccupancyGrid:
     """Draw a corridor of 60 x 2.4 m at 5 cm with a closed door on both sides every 4 m.
 
-    From its middle no scan tells one door from the next; its ends differ by a cupboard and a
-    pillar, so that somebody who drives there knows.
-
-    Returns
-    -------
-    OccupancyGrid
-        The map; its frame has the floor's south-west corner at (0, 0).
+    From its middle no scan distinguishes the doors. A cupboard and a pillar mark its ends. The
+    south-west corner of the floor is the origin of the map frame.
     """
     plan = Drawing(_LENGTH, _WIDTH, RESOLUTION, MARGIN)
     wall = 0.4  # thick enough for niches

@@ -8,13 +8,13 @@ from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.core.se2 import SE2
 
 RESOLUTION = 0.05  # of the built-in buildings, m
-MARGIN = 1.0  # nobody has looked behind the outer walls
+MARGIN = 1.0  # unknown space behind the outer walls
 HALF_WALL = 0.1
 LEG = 0.1  # a LIDAR sees the legs of a table only
 
 
 class Drawing:
-    """A sheet on which nothing is known yet.
+    """A plan to draw on; every cell is unknown at first.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ class Drawing:
     resolution : float
         Side of a cell, m.
     margin : float
-        Unknown space kept on every side, m.
+        Unknown space on every side, m.
     """
 
     def __init__(self, width: float, height: float, resolution: float, margin: float) -> None:

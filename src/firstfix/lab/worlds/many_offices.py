@@ -13,24 +13,14 @@ _BOXES = 12
 
 
 def many_offices(count: int, rng: np.random.Generator) -> OccupancyGrid:
-    """Draw floors of one plan side by side, 42 x 27 m each, no two of them furnished alike.
+    """Draw floors of one plan side by side, 42 x 27 m each, with different furniture.
 
-    Parameters
-    ----------
-    count : int
-        Number of floors, at least 1; they stand in a rectangle as square as it can be.
-    rng : numpy.random.Generator
-        Source of the furniture, a dozen boxes a floor.
-
-    Returns
-    -------
-    OccupancyGrid
-        The map; no way leads from floor to floor.
+    The floors form a rectangle that is as square as possible; no path leads from floor to floor.
 
     Raises
     ------
     InputError
-        If there is no floor to draw.
+        If ``count`` is less than 1.
     """
     if count < 1:
         raise InputError(

@@ -9,13 +9,9 @@ from firstfix.lab.worlds.drawing import HALF_WALL, MARGIN, RESOLUTION, Drawing
 def laboratory() -> OccupancyGrid:
     """Draw a laboratory of 12 x 8 m at 5 cm that looks nearly the same when turned by 180 degrees.
 
-    Benches and doors have their double on the other side, as in the paper, whose filter took the
-    lower right of its laboratory for the upper left (Fig. 4 to 9). One cupboard has none.
-
-    Returns
-    -------
-    OccupancyGrid
-        The map; its frame has the room's south-west corner at (0, 0).
+    Benches and doors have a double on the other side, as in the paper, whose filter confused the
+    lower right of its laboratory with the upper left (Fig. 4 to 9). One cupboard has no double. The
+    south-west corner is the origin of the map frame.
     """
     width, height = 12.0, 8.0
     plan = Drawing(width, height, RESOLUTION, MARGIN)
@@ -37,13 +33,9 @@ def laboratory() -> OccupancyGrid:
 def two_corridors() -> OccupancyGrid:
     """Draw two corridors of 20 x 2 m, left and right of a block, joined at their ends.
 
-    Turned by 180 degrees one looks like the other but for one door: the paper's last picture has
-    its robot found in the right one (Fig. 16).
-
-    Returns
-    -------
-    OccupancyGrid
-        The map; its frame has the floor's south-west corner at (0, 0).
+    Turned by 180 degrees one looks like the other except for one door. In the paper's last picture
+    the robot is found in the right one (Fig. 16). The south-west corner is the origin of the map
+    frame.
     """
     width, height, way = 12.0, 20.0, 2.0
     plan = Drawing(width, height, RESOLUTION, MARGIN)

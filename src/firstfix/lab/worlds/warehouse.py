@@ -13,14 +13,10 @@ _SOUTH, _NORTH = 3.0, 17.0
 
 
 def warehouse() -> OccupancyGrid:
-    """Draw a hall of 30 x 20 m at 5 cm, with eight aisles alike between racks.
+    """Draw a hall of 30 x 20 m at 5 cm, with eight identical aisles between racks.
 
-    Only the ends of the hall tell the aisles apart: an office in one corner, a gate, a pile.
-
-    Returns
-    -------
-    OccupancyGrid
-        The map; its frame has the hall's south-west corner at (0, 0).
+    Only the ends of the hall distinguish the aisles: an office in one corner, a gate, a pile. The
+    south-west corner is the origin of the map frame.
     """
     plan = Drawing(30.0, 20.0, RESOLUTION, MARGIN)
     plan.room(0.0, 0.0, 30.0, 20.0)
