@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from live_lab import Site, drive, fed, until
 
 from firstfix.core.scan import LaserScan
+from firstfix.lab.live.simulated_robot import SENSORS
 from firstfix.lab.worlds.catalog import random_free_poses
 from firstfix.web.locate_queue import MOST_WAITING
 
@@ -212,8 +213,7 @@ def test_a_few_wait_for_their_turn_and_the_rest_are_sent_away(api, site, scan, m
 
 def test_many_poses_of_a_house_are_found_through_the_api(api, site):
     grid = site.store.snapshot.map.grid
-    robot = drive("house").robot
-    lidar = robot._scenario.lidar
+    lidar = next(iter(SENSORS.values()))
     rng = np.random.default_rng(0)
     for pose in random_free_poses(grid, rng, 5, 0.5):
         scan = lidar.scan(grid, pose @ lidar.T_base_laser, rng)

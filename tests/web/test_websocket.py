@@ -49,7 +49,7 @@ def site(office: Drive):
 
 def kind_of(message: str | bytes) -> str:
     if isinstance(message, bytes):
-        return {1: "scan", 2: "particles"}[message[0]]
+        return {1: "scan", 2: "particles", 3: "belief"}[message[0]]
     return json.loads(message)["type"]
 
 
@@ -69,8 +69,9 @@ def next_of(viewer: ClientConnection, kind: str) -> dict:
 
 def test_a_viewer_is_greeted_and_sees_all_that_there_is(site: Site):
     with connect(site.live) as viewer:
-        first = [viewer.recv(PATIENCE_S) for _ in range(4)]
-        assert [kind_of(message) for message in first] == ["hello", "state", "scan", "particles"]
+        first = [viewer.recv(PATIENCE_S) for _ in range(5)]
+        kinds = ["hello", "state", "scan", "particles", "belief"]
+        assert [kind_of(message) for message in first] == kinds
         hello, state = json.loads(first[0]), json.loads(first[1])
         assert (hello["robot"], hello["may_steer"], hello["abilities"]) == ("ros2", True, [])
         assert hello["map"]["name"] == "office"

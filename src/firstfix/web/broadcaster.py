@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 
-from firstfix.web.binary_frames import particles_frame, scan_frame
+from firstfix.web.binary_frames import belief_frame, particles_frame, scan_frame
 from firstfix.web.messages import Refusal, Status, encode_text
 from firstfix.web.snapshot import Snapshot
 from firstfix.web.snapshot_store import SnapshotStore
@@ -82,6 +82,7 @@ class Broadcaster:
         self._viewers: set[Viewer] = set()
         self._changed = asyncio.Event()
         self._sent = Snapshot()
+        self._sent_heat = b""
         self._next_event = 0
 
     def __len__(self) -> int:
@@ -158,4 +159,8 @@ class Broadcaster:
         moved = before is None or before.pose != snapshot.pose
         if moved or before is None or before.particles is not snapshot.particles:
             frames["particles"] = particles_frame(snapshot.particles, snapshot.pose, snapshot.stamp)
+        if before is None or before.belief is not snapshot.belief:
+            heat = belief_frame(snapshot.belief, snapshot.map)
+            if before is None or heat != self._sent_heat:  # it changes less often than the belief
+                frames["belief"] = self._sent_heat = heat
         return frames

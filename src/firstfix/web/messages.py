@@ -96,6 +96,13 @@ class Menus(Struct, frozen=True):
     sensors: tuple[str, ...]
 
 
+class BeliefSummary(Struct, frozen=True):
+    """The belief over the whole map; the heat map is a binary message."""
+
+    places: Annotated[Count, Meta(description="number of places that are still possible")]
+    elsewhere: Annotated[Share, Meta(description="probability that the robot is at no such place")]
+
+
 class Hello(Struct, frozen=True, tag_field="type", tag="hello"):
     """The first message: what the robot is and what can be done."""
 
@@ -124,6 +131,7 @@ class Status(Struct, frozen=True, tag_field="type", tag="state"):
         str | None, Meta(description="who chose among them, until evidence decides")
     ]
     evidence: Evidence | None
+    belief: BeliefSummary | None
     particles: Count
     cpu_ms: float | None
     time_to_fix_s: float | None
@@ -148,6 +156,7 @@ class Status(Struct, frozen=True, tag_field="type", tag="state"):
             rivals=snapshot.rivals,
             chosen_by=snapshot.chosen_by,
             evidence=snapshot.evidence,
+            belief=_belief(snapshot),
             particles=0 if cloud is None else len(cloud.particles),
             cpu_ms=snapshot.cpu_ms,
             time_to_fix_s=snapshot.time_to_fix_s,
@@ -203,6 +212,13 @@ def as_tuple(pose: SE2) -> tuple[float, float, float]:
 def encode_text(message: Struct) -> str:
     """Encode a message as JSON; NaN and infinity become null."""
     return msgspec.json.encode(message).decode()
+
+
+def _belief(snapshot: Snapshot) -> BeliefSummary | None:
+    belief = snapshot.belief
+    if belief is None:
+        return None
+    return BeliefSummary(len(belief.probabilities), belief.elsewhere)
 
 
 def _covariance(snapshot: Snapshot) -> tuple[float, float, float, float] | None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.amcl.particles import Particles
+from firstfix.belief.belief import Belief
 from firstfix.core.estimate import Evidence, Hypothesis
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
@@ -97,6 +98,8 @@ class Snapshot:
         The last scan with a pose.
     particles : ParticleCloud or None
         The particles of the filter.
+    belief : Belief or None
+        Probabilities of all places of the map.
     cpu_ms : float or None
         Processor time for a scan, median of the last ones, ms.
     time_to_fix_s : float or None
@@ -120,6 +123,7 @@ class Snapshot:
     motion: MotionRequest | None = None
     scan: RegisteredScan | None = None
     particles: ParticleCloud | None = None
+    belief: Belief | None = None
     cpu_ms: float | None = None
     time_to_fix_s: float | None = None
     truth: SE2 | None = None

@@ -31,6 +31,13 @@ export function percent(share) {
   return `${Math.round(100 * share)}%`;
 }
 
+/** Places that are still possible, and the probability that the robot is elsewhere. */
+export function beliefText(belief) {
+  if (!belief) return "–";
+  const places = belief.places === 1 ? "1 place" : `${belief.places} places`;
+  return `${places} · elsewhere ${percent(belief.elsewhere)}`;
+}
+
 /** A pose: metres, and the heading from 0° to 359°, counter-clockwise from +x. */
 export function poseText([x, y, yaw]) {
   return `${metres(x)}, ${metres(y)} m · ${heading(yaw)}`;

@@ -138,6 +138,7 @@ export class Panel {
     setText(byId("spread"), pose && covariance ? spreadText(covariance) : "–");
     byId("error-row").hidden = !truth;
     setText(byId("error"), pose && truth ? errorText(pose, truth) : "–");
+    setText(byId("belief"), format.beliefText(state.belief));
     const fix = state.time_to_fix_s;
     setText(byId("time-to-fix"), fix == null ? "–" : format.seconds(fix));
     setText(byId("cpu"), state.cpu_ms == null ? "–" : `${state.cpu_ms.toFixed(1)} ms`);

@@ -1,5 +1,6 @@
 /** Two canvases, one for the map and one for what moves on it; drawn only after a change. */
 
+import { drawBelief } from "./layers/belief.js";
 import { drawDraft, drawGoal } from "./layers/draft.js";
 import { drawGrid } from "./layers/grid.js";
 import { drawHypotheses } from "./layers/hypotheses.js";
@@ -76,6 +77,7 @@ export class Renderer {
     const { state, shown, hypotheses } = scene;
     const ctx = cleared(this.#overlay, view);
     const pose = state?.pose ?? null;
+    if (shown.belief && scene.heat && scene.map) drawBelief(ctx, view, scene.map, scene.heat, colours.hypothesis);
     if (shown.scan && scene.scan && pose) drawFieldOfView(ctx, view, scene.scan, pose, colours);
     if (shown.trail && scene.trail.length) drawTrail(ctx, view, scene.trail, colours);
     if (shown.scan && scene.scan) drawScan(ctx, view, scene.scan, colours);

@@ -13,13 +13,14 @@ export class Scene {
     this.draft = null; // {kind, x, y, yaw}: the command that is being drawn
     this.goal = null; // [x, y] where the robot was last sent
     this.highlighted = null; // id of the hypothesis under the pointer or the focus
-    this.shown = { scan: true, particles: true, trail: true, truth: true };
+    this.shown = { belief: true, scan: true, particles: true, trail: true, truth: true };
   }
 
   clearRobot() {
     this.state = null;
     this.scan = null;
     this.particles = null;
+    this.heat = null;
     this.trail = [];
     this.goal = null;
     this.highlighted = null;
@@ -42,6 +43,7 @@ export class Scene {
 
   takeFrame(frame) {
     if (frame.kind === "scan") this.scan = frame;
+    else if (frame.kind === "belief") this.heat = frame.heat;
     else this.particles = frame;
   }
 
