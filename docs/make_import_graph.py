@@ -1,4 +1,4 @@
-"""Draws in ARCHITECTURE.md which rooms import which: ``python docs/make_import_graph.py``."""
+"""Draws in ARCHITECTURE.md which packages import which: ``python docs/make_import_graph.py``."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import grimp
 
 PAGE = Path(__file__).parents[1] / "ARCHITECTURE.md"
 BEGIN, END = "```mermaid\n", "```\n"
-# The roof imports all rooms, and all rooms stand on the floor: those arrows would hide the others.
-ROOF, FLOOR = "cli", "core"
-ROOMS = (
+# The top may import all packages and all import the bottom: those arrows would hide the others.
+TOP, BOTTOM = "cli", "core"
+PACKAGES = (
     "lab",
     "web",
     "ros",
     "localizer",
     "io",
     "plots",
+    "belief",
     "amcl",
     "global_localization",
     "fields",
@@ -24,10 +25,10 @@ ROOMS = (
 
 
 def imports() -> set[tuple[str, str]]:
-    """Return pairs of rooms: the one that imports, the one that is imported."""
+    """Return pairs of packages: the importing one, the imported one."""
     graph = grimp.build_graph("firstfix")
     pairs = {
-        (_room(importer), _room(imported))
+        (_package(importer), _package(imported))
         for importer in graph.modules
         for imported in graph.find_modules_directly_imported_by(importer)
     }
@@ -35,27 +36,22 @@ def imports() -> set[tuple[str, str]]:
 
 
 def page_with(pairs: set[tuple[str, str]], page: str) -> str:
-    """Put the drawing, in the language of Mermaid, into a page where there is one already."""
+    """Replace the Mermaid diagram of a page."""
     head, _, rest = page.partition(BEGIN)
-    names = [f'    {_id(room)}["{room.replace(".", "/")}"]\n' for room in ROOMS]
+    names = [f'    {name}["{name}"]\n' for name in PACKAGES]
     drawn = [
-        f"    {_id(above)} --> {_id(below)}\n"
-        for above in ROOMS
-        for below in ROOMS
+        f"    {above} --> {below}\n"
+        for above in PACKAGES
+        for below in PACKAGES
         if (above, below) in pairs
     ]
     return head + BEGIN + "flowchart TD\n" + "".join(names + drawn) + END + rest.partition(END)[2]
 
 
-def _room(module: str) -> str:
-    """Return the room of a module; what stands at the door has none."""
-    path = module.removeprefix("firstfix.")
-    found = [room for room in (ROOF, *ROOMS, FLOOR) if f"{path}.".startswith(f"{room}.")]
-    return max(found, key=len, default="")
-
-
-def _id(room: str) -> str:
-    return room.replace(".", "_")
+def _package(module: str) -> str:
+    """Return the package of a module; empty for modules at the top level."""
+    name = module.removeprefix("firstfix.").partition(".")[0]
+    return name if name in (TOP, *PACKAGES, BOTTOM) else ""
 
 
 if __name__ == "__main__":
