@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from firstfix.belief.belief import Belief
+from firstfix.belief.view import View
 from firstfix.core.angles import angle_error
 from firstfix.core.estimate import LocateResult
 from firstfix.core.grid import OccupancyGrid
@@ -22,6 +24,7 @@ from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import identical_rooms, random_free_poses
 from firstfix.lab.worlds.drawing import Drawing
 from firstfix.lab.worlds.office import office as draw_office
+from firstfix.localizer import place_belief
 from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import InitialPose, Output, Status, TrackedPose
@@ -238,11 +241,16 @@ def foreign(
 @pytest.fixture
 def searches(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Note the stamps of all scans that a whole map is searched for."""
-    stamps, locate = [], ScanMatcher.locate
+    stamps, locate, update = [], ScanMatcher.locate, place_belief.update
 
-    def spy(self: ScanMatcher, scan: LaserScan) -> LocateResult:
+    def spy_on_locate(self: ScanMatcher, scan: LaserScan) -> LocateResult:
         stamps.append(scan.stamp)
         return locate(self, scan)
 
-    monkeypatch.setattr(ScanMatcher, "locate", spy)
+    def spy_on_update(belief: Belief, view: View) -> Belief:
+        stamps.append(view.scans[0].stamp)
+        return update(belief, view)
+
+    monkeypatch.setattr(ScanMatcher, "locate", spy_on_locate)
+    monkeypatch.setattr(place_belief, "update", spy_on_update)
     return stamps

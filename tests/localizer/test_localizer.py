@@ -146,7 +146,7 @@ def test_the_motion_that_is_asked_for_decides(
 # ---- nothing fits
 
 
-def test_a_foreign_building_is_told_once_a_second(foreign, searches, of, kinds):
+def test_a_wrong_map_is_searched_once_a_second_at_rest(foreign, searches, of, kinds):
     robot = foreign
     searches.clear()
     before = len(robot.said)
@@ -156,9 +156,11 @@ def test_a_foreign_building_is_told_once_a_second(foreign, searches, of, kinds):
     assert kinds(robot.said[before:]) == [Status] * 3
     for status in of(Status, robot.said):
         assert status.state is State.SEARCHING
-        assert "even at the best place only" in status.reason
+        assert "no place of the map explains" in status.reason
         assert status.evidence.explained < 0.8
-    # Who moves sees something else: that is worth a search of its own.
+        assert status.rivals == 0
+        assert status.elsewhere > 0.5
+    # A robot that moves sees something else, which is worth a search of its own.
     searches.clear()
-    robot.ticks(5, SE2(0.11, 0.0, 0.0))
+    robot.ticks(5, SE2(0.31, 0.0, 0.0))
     assert len(searches) == 5

@@ -109,6 +109,17 @@ class Belief:
         return self.judgement.reason
 
     @cached_property
+    def evidence(self) -> NDArray[np.float64]:
+        """Probabilities of the places by the views alone, priors left out, shape (n,)."""
+        if not self.window:
+            return np.empty(0)
+        grid = self.fields.grid
+        logs = hint_logs(self.tracks.now, self.window[-1], self.hints, grid)
+        weights = self.probabilities * np.exp(-logs)
+        shares: NDArray[np.float64] = weights / (weights.sum() + self.elsewhere)
+        return shares
+
+    @cached_property
     def poses(self) -> NDArray[np.float64]:
         """``T_map_base`` of all places now, shape (n, 3): x (m), y (m), yaw (rad)."""
         if not self.window:

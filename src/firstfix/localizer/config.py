@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from firstfix.amcl.config import AmclConfig
+from firstfix.belief.config import BeliefConfig
 from firstfix.core.arguments import as_instance
 from firstfix.core.settings import check_settings, setting
 from firstfix.global_localization.config import LocateConfig
@@ -47,13 +48,13 @@ class MonitorConfig:
         2, "consecutive scans that must agree on another place to move there", 1, 100
     )
     new_view_m: float = setting(
-        0.5, "distance after which a scan counts as a new view of several places, m", _LEAST, 100.0
+        0.5, "distance after which a scan counts as a new view after a loss, m", _LEAST, 100.0
     )
     new_view_rad: float = setting(
         math.radians(30.0), "turn after which a scan counts as a new view, rad", _LEAST, math.pi
     )
     rest_period_s: float = setting(
-        1.0, "time between searches while a robot with several places rests, s", _LEAST, 3600.0
+        1.0, "time between searches while a robot that is not found rests, s", _LEAST, 3600.0
     )
     correct_m: float = setting(
         0.15, "position error that is corrected although the scan still fits, m", _LEAST, 100.0
@@ -61,14 +62,11 @@ class MonitorConfig:
     correct_rad: float = setting(
         math.radians(5.0), "heading error that is corrected likewise, rad", _LEAST, math.pi
     )
-    decided_probability: float = setting(
-        0.99, "least probability of one of several places to be published", 0.5, 1.0
-    )
     decided_cost: float = setting(
-        1.3, "highest mean cost at which a place is published or moved to, nats", _LEAST, 100.0
+        1.3, "highest mean cost at which a track is moved to another place, nats", _LEAST, 100.0
     )
     decided_views: int = setting(
-        3, "least number of views to decide, and of misfits in a row to give up", 1, 100
+        3, "views that must agree on a place far from where the pose was lost", 1, 100
     )
 
     def __post_init__(self) -> None:
@@ -86,7 +84,9 @@ class LocalizerConfig:
     amcl : AmclConfig
         Pose tracking.
     monitor : MonitorConfig
-        Verification of the pose, and the choice between several places.
+        Verification of the tracked pose.
+    belief : BeliefConfig
+        The choice between several places.
 
     Examples
     --------
@@ -98,8 +98,10 @@ class LocalizerConfig:
     locate: LocateConfig = field(default_factory=LocateConfig)
     amcl: AmclConfig = field(default_factory=AmclConfig)
     monitor: MonitorConfig = field(default_factory=MonitorConfig)
+    belief: BeliefConfig = field(default_factory=BeliefConfig)
 
     def __post_init__(self) -> None:
         as_instance(LocateConfig, self.locate, "locate")
         as_instance(AmclConfig, self.amcl, "amcl")
         as_instance(MonitorConfig, self.monitor, "monitor")
+        as_instance(BeliefConfig, self.belief, "belief")

@@ -35,6 +35,9 @@ _USUAL_COST = 0.3
 _LEAST_FRACTION = 0.1
 _FRACTION_PER_M = 0.02
 
+# A view counts as a second one from 15 degrees on.
+_SECOND_LOOK_RAD = math.radians(20.0)
+
 # Space that a robot needs on its way, in front and at its sides.
 _ROOM_M = 0.5
 _SIDES_RAD = (-0.3, 0.0, 0.3)
@@ -81,6 +84,11 @@ def deciding_motion(
             if gain > _LEAST_FRACTION * now and worth > best_worth:
                 best, best_worth = MotionRequest(scan.stamp, turn, ahead, gain), worth
     return best
+
+
+def second_look(scan: LaserScan) -> MotionRequest:
+    """Return the turn after which a single place that is left can be confirmed."""
+    return MotionRequest(scan.stamp, _SECOND_LOOK_RAD, 0.0, 0.0)
 
 
 def _room_ahead(grid: OccupancyGrid, T_map_base: SE2, turn: float) -> float:

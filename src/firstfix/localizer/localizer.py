@@ -2,43 +2,47 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
-from dataclasses import replace
+import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from firstfix.amcl.particles import Particles
+from firstfix.belief.belief import Belief
+from firstfix.belief.prior import Near
 from firstfix.core.arguments import as_instance
-from firstfix.core.estimate import Evidence, Hypothesis, LocateResult, Verdict
+from firstfix.core.errors import InputError
+from firstfix.core.estimate import Evidence, Hypothesis, Verdict
 from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
-from firstfix.global_localization.places import is_same_place
+from firstfix.global_localization.places import SAME_PLACE_M, SAME_PLACE_RAD, is_same_place
 from firstfix.global_localization.scan_matcher import ScanMatcher
-from firstfix.localizer.agreement import AgreementCounter, is_new_view
+from firstfix.localizer.agreement import LostPose
 from firstfix.localizer.config import LocalizerConfig
-from firstfix.localizer.contest import Contest, Standing
-from firstfix.localizer.deciding_motion import FARTHEST_M, deciding_motion
+from firstfix.localizer.deciding_motion import FARTHEST_M, deciding_motion, second_look
 from firstfix.localizer.inputs import Input, NewMap, NoMotionUpdate, PoseHint, Reset, check_input
 from firstfix.localizer.outputs import Hypotheses, InitialPose, Output, Status
+from firstfix.localizer.place_belief import Pace, PlaceBelief, Support
 from firstfix.localizer.pose_monitor import Fit
 from firstfix.localizer.pose_tracker import PoseTracker, Tracked
 from firstfix.localizer.scan_queue import ScanQueue
 from firstfix.localizer.states import Event, State, next_state
 
-# A robot that rests where nothing fits sees the same again. People may go, so search once a second.
-_RETRY_S = 1.0
-_RETRY_M = 0.1
+# A person's click is good to about a metre and 40 degrees.
+_HINT_M = 1.0
+_HINT_RAD = math.radians(40.0)
+# Log-likelihood of a prior down to which a place counts as the hinted one.
+_HINTED = -1.0
 
-# A hint is confirmed if the scan fits there nearly as well as at the best place of the map.
-_AS_GOOD = 1.5
-_GOOD_COST = 0.3
 
-# A robot that lost its pose is accepted at the first UNIQUE scan within this distance.
-_STRAYED_M = 2.0
+@dataclass(frozen=True, slots=True)
+class Hint:
+    """A pose that was proposed: by whom, and as a prior."""
+
+    source: str
+    claim: Near
 
 
 class Localizer:
@@ -76,17 +80,12 @@ class Localizer:
         self._scans = ScanQueue()
         self._lifted: set[SignalKind] = set()
         self._update_requested = False
-        self._hint: PoseHint | None = None
+        self._hint: Hint | None = None
         self._chosen_by: str | None = None
-        self._contest: Contest | None = None
-        self._ids = itertools.count(1)
-        self._compared_at = 0.0  # when the places were last compared
-        self._nothing_fitted_at: tuple[float, SE2] | None = None
-        self._lost_T_map_odom: SE2 | None = None  # if contradicted, and not picked up since
-        self._agreement = AgreementCounter()
-        self._agreed_at: SE2 | None = None
+        self._lost_pose = LostPose(self.config.monitor)
         self._matcher: ScanMatcher
         self._tracker: PoseTracker
+        self._places: PlaceBelief
 
     @property
     def state(self) -> State:
@@ -101,6 +100,11 @@ class Localizer:
     def particles(self) -> Particles | None:
         """The particles of the tracked pose; None while there is none."""
         return None if self._state is State.NO_MAP else self._tracker.particles
+
+    @property
+    def belief(self) -> Belief | None:
+        """The belief over all places of the map; None before the first map."""
+        return None if self._state is State.NO_MAP else self._places.belief
 
     @property
     def matcher(self) -> ScanMatcher | None:
@@ -154,6 +158,9 @@ class Localizer:
     def _take_map(self, given: NewMap) -> list[Output]:
         matcher = ScanMatcher(given.grid, config=self.config.locate, cache_dir=self._cache_dir)
         self._tracker = PoseTracker(matcher, self.config, self._rng)
+        self._places = PlaceBelief(
+            matcher.fields, self.config.belief, self.config.monitor.rest_period_s
+        )
         self._matcher = matcher
         status = self._restart(given.stamp, Event.MAP_RECEIVED, "map received: searching")
         if not self._lifted:
@@ -195,21 +202,39 @@ class Localizer:
         return [self._status(given.stamp, "set down: waiting for the next scan")]
 
     def _take_hint(self, given: PoseHint) -> list[Output]:
-        if given.hypothesis_id is not None:
-            place = self._listed_place(given.hypothesis_id)
-            if place is None:
-                reason = f"place {given.hypothesis_id} is no longer listed: choose another one"
-                return [self._status(given.stamp, reason)]
-            given = replace(given, T_map_base=place.pose)
+        try:
+            claim = self._claim_of(given)
+        except InputError as error:
+            return [self._status(given.stamp, f"hint of {given.source} refused: {error}")]
+        if claim is None:
+            reason = f"place {given.hypothesis_id} is no longer listed: choose another one"
+            return [self._status(given.stamp, reason)]
         self._tracker.stop()
-        self._hint, self._chosen_by = given, None
+        self._hint, self._chosen_by = Hint(given.source, claim), None
         self._fire(Event.HINT_RECEIVED)
         reason = f"{given.source} proposes a pose: the next scan will verify it"
         return [self._status(given.stamp, reason)]
 
+    def _claim_of(self, given: PoseHint) -> Near | None:
+        """Add a hint to the belief as a prior; None if it names a place that is gone.
+
+        A listed place is weighed with the views so far. Any other pose may be that of a robot that
+        was carried there, so the views so far are discarded.
+        """
+        if given.hypothesis_id is None:
+            claim = Near(given.T_map_base, _HINT_M, _HINT_RAD)
+            self._places.restart(claim)
+            return claim
+        listed = self._places.places if self._state is not State.SEARCHING else ()
+        place = next((p for p in listed if p.id == given.hypothesis_id), None)
+        if place is None:
+            return None
+        claim = Near(place.pose, SAME_PLACE_M, SAME_PLACE_RAD)
+        self._places.add_prior(claim)
+        return claim
+
     def _take_update_request(self, given: NoMotionUpdate) -> list[Output]:
         self._update_requested = True
-        self._nothing_fitted_at = None
         return [self._status(given.stamp, "the next scan will be used in any case")]
 
     def _use_next_scan(self) -> list[Output]:
@@ -222,8 +247,8 @@ class Localizer:
         if self._state is State.LIFTED or not self._scans.is_valid(scan):
             return []
         steps = {
-            State.SEARCHING: self._search,
-            State.DISAMBIGUATING: self._disambiguate,
+            State.SEARCHING: self._find,
+            State.DISAMBIGUATING: self._find,
             State.VERIFYING_HINT: self._verify_hint,
             State.LOCALIZED: self._follow,
         }
@@ -231,67 +256,45 @@ class Localizer:
 
     # ---- one scan in each state
 
-    def _search(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
-        if not self._is_worth_searching(scan, T_odom_base):
+    def _find(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
+        """Weigh all places; publish the best one when it is sure."""
+        if not self._weigh(scan, T_odom_base, Pace.AT_REST_TOO):
             return []
-        result = self._matcher.locate(scan)
-        best = result.best
-        self._nothing_fitted_at = None
-        if best is None or result.verdict is Verdict.NO_MATCH:
-            self._nothing_fitted_at = scan.stamp, T_odom_base
-            evidence = best.evidence if best is not None else None
-            return [self._status(scan.stamp, result.reason, evidence)]
-        if result.verdict is Verdict.UNIQUE:
-            if not self._is_plausible(T_odom_base, best):
+        verdict, reason = self._places.belief.verdict, self._places.belief.reason
+        best = self._places.places[0] if self._places.places else None
+        is_searching = self._state is State.SEARCHING
+        if best is None or verdict is Verdict.NO_MATCH:
+            if not is_searching:
+                self._fire(Event.CONTRADICTED)
+            return [self._status(scan.stamp, reason, best.evidence if best else None)]
+        if verdict is Verdict.UNIQUE:
+            if not self._lost_pose.allows(best.pose, T_odom_base):
                 reason = "one place fits, far from where the pose was lost: waiting for more views"
                 return [self._status(scan.stamp, reason, best.evidence)]
-            return self._arrive(scan, T_odom_base, best, Event.ONE_PLACE_FITS, result.reason)
-        self._contest = self._contest_of(result.hypotheses, T_odom_base)
-        self._compared_at = scan.stamp
-        self._fire(Event.SEVERAL_PLACES_FIT)
-        return self._list_places(scan, self._contest)
-
-    def _disambiguate(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
-        contest = self._contest
-        assert contest is not None  # noqa: S101 - every way into this state begins one
-        if contest.brings_news(T_odom_base) or self._update_requested:
-            standing = contest.look(scan, T_odom_base)
-        elif not 0.0 <= scan.stamp - self._compared_at < self.config.monitor.rest_period_s:
-            standing = contest.look_at_rest(scan, T_odom_base)
-        else:
-            return []
-        self._update_requested, self._compared_at = False, scan.stamp
-        best = contest.places[0]
-        if standing is Standing.WON:
-            reason = f"one place is left; {best.evidence.explained:.0%} of the beams fit there"
-            return self._arrive(scan, T_odom_base, best, Event.DECIDED, reason)
-        if standing is Standing.LOST:
-            reason = "no remaining place explains the scans: searching"
-            return [self._restart(scan.stamp, Event.CONTRADICTED, reason)]
-        return self._list_places(scan, contest)
+            event = Event.ONE_PLACE_FITS if is_searching else Event.DECIDED
+            return self._arrive(scan, T_odom_base, best, event, reason)
+        if is_searching:
+            self._fire(Event.SEVERAL_PLACES_FIT)
+        return self._list_places(scan)
 
     def _verify_hint(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
-        hint = self._hint
-        assert hint is not None  # noqa: S101 - every way into this state brings one
-        if np.count_nonzero(usable_beams(scan).hit) < FEWEST_HITS:
-            reason = f"{hint.source} proposes a pose; the sensor sees too little to verify it"
+        """Let the belief judge a pose that was proposed."""
+        assert self._hint is not None  # noqa: S101 - every way into this state brings one
+        source, claim = self._hint.source, self._hint.claim
+        if not self._weigh(scan, T_odom_base, Pace.EVERY_SCAN) or self._places.is_blind:
+            reason = f"{source} proposes a pose; the sensor sees too little to verify it"
             return [self._status(scan.stamp, reason)]
-        self._hint = None
-        place = self._matcher.search_locally(scan, hint.T_map_base)
-        result = self._matcher.locate(scan)
-        if not self._explains(place, result):
-            reason = f"the pose proposed by {hint.source} does not explain the scan: searching"
-            return [self._restart(scan.stamp, Event.HINT_REJECTED, reason, place.evidence)]
-        contest = self._contest
-        reason = (
-            f"{hint.source} proposed this pose; {place.evidence.explained:.0%} of the beams fit"
-        )
-        outputs = self._arrive(scan, T_odom_base, place, Event.HINT_CONFIRMED, reason)
-        if result.verdict is Verdict.UNIQUE:
-            return outputs
-        self._contest = contest or self._contest_of((*result.hypotheses, place), T_odom_base)
-        self._chosen_by = hint.source
-        return [*outputs[:-1], self._status(scan.stamp, self._choice(), place.evidence)]
+        belief, places = self._places.belief, self._places.places
+        hinted = [p for p in places if claim.log_likelihood(p.pose.as_array()[None])[0] >= _HINTED]
+        if belief.verdict is Verdict.UNIQUE and places[0] in hinted:
+            fit = f"{places[0].evidence.explained:.0%} of the beams fit"
+            reason = f"{source} proposed this pose; {fit}"
+            return self._arrive(scan, T_odom_base, places[0], Event.HINT_CONFIRMED, reason)
+        if belief.verdict is Verdict.AMBIGUOUS and hinted:
+            self._fire(Event.SEVERAL_PLACES_FIT)
+            return self._list_places(scan)
+        reason = f"the pose proposed by {source} does not explain the scan: searching"
+        return [self._restart(scan.stamp, Event.HINT_REJECTED, reason)]
 
     def _follow(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
         tracked = self._tracker.follow(scan, T_odom_base, force_update=self._update_requested)
@@ -309,16 +312,36 @@ class Localizer:
             reason = f"only {explained:.0%} of the beams fit here, for too long: searching"
             return [self._restart(scan.stamp, Event.CONTRADICTED, reason, place.evidence)]
         if not tracked.is_confirmed:
-            reason = f"odometry has leapt, {_fit_words(tracked)}: waiting for a scan that fits"
+            reason = f"odometry has leapt, {tracked.fit_in_words}: waiting for a scan that fits"
             return [self._status(scan.stamp, reason, place.evidence)]
-        if self._contest is not None and fit is Fit.CONSISTENT:
-            T_map_base = tracked.pose.T_map_base
-            other = self._weigh_choice(scan, T_odom_base, T_map_base, self._contest)
-            if other is not None:
-                reason = f"the scans fit another place than the one chosen by {self._chosen_by}"
-                return self._arrive(scan, T_odom_base, other, Event.RELOCALIZED, reason)
-        reason = self._choice() if self._chosen_by is not None else _fit_words(tracked)
+        revised = self._reconsider(scan, T_odom_base, tracked)
+        if revised:
+            return revised
+        reason = self._choice() or tracked.fit_in_words
         return [tracked.pose, self._status(scan.stamp, reason, place.evidence)]
+
+    def _reconsider(self, scan: LaserScan, T_odom_base: SE2, tracked: Tracked) -> list[Output]:
+        """Weigh all places in the background; return what changes if the pose was wrong."""
+        pace = self._places.tracking_pace
+        if self._chosen_by is not None or tracked.judgement.fit is not Fit.CONSISTENT:
+            pace = Pace.EVERY_VIEW
+        if not self._weigh(scan, T_odom_base, pace):
+            return []
+        T_map_base = tracked.pose.T_map_base
+        support = self._places.support_for(T_map_base)
+        if support is Support.SAME_PLACE and self._places.is_decided_by_evidence:
+            self._chosen_by = None
+        if support is Support.OTHER_PLACE:
+            best = self._places.places[0]
+            away = best.pose.distance_to(T_map_base)
+            reason = f"{away:.1f} m from the tracked pose {self._places.belief.reason}"
+            return self._arrive(scan, T_odom_base, best, Event.RELOCALIZED, reason)
+        if support is Support.WITHDRAWN:
+            self._tracker.stop()
+            self._chosen_by = None
+            self._fire(Event.REVOKED)
+            return self._list_places(scan)
+        return []
 
     # ---- steps
 
@@ -327,9 +350,17 @@ class Localizer:
     ) -> list[Output]:
         """Publish where the robot was found, and track it from there."""
         pose = self._tracker.start(scan.stamp, T_odom_base, place)
-        self._contest = self._chosen_by = None
+        if event is Event.RELOCALIZED:
+            self._hint = None
+        if not self._places.places or place is not self._places.places[0]:
+            self._places.restart()  # found by the monitor: earlier views were taken elsewhere
+        self._chosen_by = None
+        if self._hint is not None and not self._places.is_decided_by_evidence:
+            self._chosen_by = self._hint.source
+        self._places.pose_was_published()
         self._fire(event)
         initial = InitialPose(scan.stamp, pose.T_map_base, pose.covariance)
+        reason = self._choice() or reason
         return [initial, pose, self._status(scan.stamp, reason, place.evidence)]
 
     def _restart(
@@ -337,11 +368,10 @@ class Localizer:
     ) -> Status:
         """Discard everything about the pose, and change the state."""
         is_contradicted = event is Event.CONTRADICTED
-        self._lost_T_map_odom = self._tracker.T_map_odom if is_contradicted else None
+        self._lost_pose.set(self._tracker.T_map_odom if is_contradicted else None)
         self._tracker.stop()
-        self._agreement.clear()
-        self._agreed_at = self._nothing_fitted_at = None
-        self._hint = self._contest = self._chosen_by = None
+        self._hint = self._chosen_by = None
+        self._places.restart()
         self._scans.clear()
         self._fire(event)
         return self._status(stamp, reason, evidence)
@@ -350,42 +380,20 @@ class Localizer:
         self._state = next_state(self._state, event)
 
     def _status(self, stamp: float, reason: str, evidence: Evidence | None = None) -> Status:
-        rivals = 1 if self._state is State.LOCALIZED else 0
-        if self._contest is not None:
-            rivals = self._contest.rivals
-        return Status(stamp, self._state, reason, evidence, rivals, self._chosen_by)
+        rivals, elsewhere = 0, None
+        if self._state is not State.NO_MAP and not self._places.is_blind:
+            elsewhere = self._places.belief.elsewhere
+        if self._state is State.DISAMBIGUATING or self._chosen_by is not None:
+            rivals = self._places.rivals
+        elif self._state is State.LOCALIZED:
+            rivals = 1
+        return Status(stamp, self._state, reason, evidence, rivals, self._chosen_by, elsewhere)
 
-    def _is_plausible(self, T_odom_base: SE2, place: Hypothesis) -> bool:
-        """Return whether a UNIQUE place may be published.
-
-        A robot that lost its pose and was not picked up is not far away, or it has left the mapped
-        area. A place far away needs several agreeing scans from different poses.
-        """
-        if self._lost_T_map_odom is None:
-            return True
-        if place.pose.distance_to(self._lost_T_map_odom @ T_odom_base) <= _STRAYED_M:
-            return True
-        config = self.config.monitor
-        if self._agreed_at is not None and not is_new_view(self._agreed_at, T_odom_base, config):
-            return False
-        self._agreed_at = T_odom_base
-        return self._agreement.count(place.pose, T_odom_base) >= config.decided_views
-
-    def _is_worth_searching(self, scan: LaserScan, T_odom_base: SE2) -> bool:
-        """Return whether a scan may fit somewhere although the last one fitted nowhere."""
-        if self._nothing_fitted_at is None:
-            return True
-        stamp, T_odom_then = self._nothing_fitted_at
-        moved = T_odom_then.distance_to(T_odom_base) >= _RETRY_M
-        return moved or not 0.0 <= scan.stamp - stamp < _RETRY_S
-
-    def _explains(self, place: Hypothesis, result: LocateResult) -> bool:
-        """Return whether a hinted place fits nearly as well as the best place of the map."""
-        best = result.best or place
-        is_elsewhere = result.verdict is Verdict.UNIQUE and not is_same_place(place.pose, best.pose)
-        is_as_good = place.score <= _AS_GOOD * max(best.score, _GOOD_COST)
-        fits = place.score <= self.config.monitor.doubtful_cost
-        return is_as_good and fits and not is_elsewhere
+    def _weigh(self, scan: LaserScan, T_odom_base: SE2, pace: Pace) -> bool:
+        """Update the belief if a scan is due; return whether it was."""
+        if self._update_requested:
+            pace, self._update_requested = Pace.EVERY_SCAN, False
+        return self._places.update(scan, T_odom_base, pace)
 
     def _change_frame(self, before: Odometry, now: Odometry) -> list[Output]:
         """Go on at the same pose in a new odometry frame; the next scan judges it."""
@@ -393,63 +401,35 @@ class Localizer:
             # The places moved with the old frame.
             reason = "odometry jumped while several places fit: searching"
             return [self._restart(now.stamp, Event.ODOMETRY_JUMPED, reason)]
-        self._contest = None
+        if self._state is State.VERIFYING_HINT and self._hint is not None:
+            self._places.restart(self._hint.claim)
+        else:
+            self._places.restart()
         self._tracker.change_frame(before, now)
         return []
 
-    # ---- several places
-
-    def _contest_of(self, places: Sequence[Hypothesis], T_odom_base: SE2) -> Contest:
-        return Contest(tuple(places), T_odom_base, self._matcher, self.config.monitor, self._ids)
-
-    def _list_places(self, scan: LaserScan, contest: Contest) -> list[Output]:
-        places, rivals = contest.places, contest.rivals
+    def _list_places(self, scan: LaserScan) -> list[Output]:
+        """Report the places that are left, and the motion that would decide between them."""
+        places, rivals = self._places.places, self._places.rivals
         motion = deciding_motion(scan, places, self._matcher.fields.grid)
-        if rivals <= 1:
-            reason = f"the best place has a probability of {places[0].probability:.0%}"
-        elif motion is not None:
+        reason = self._places.belief.reason
+        if rivals > 1 and motion is not None:
             reason = f"{rivals} places fit about equally well; motion would decide"
-        else:
+        elif rivals > 1:
             reason = f"{rivals} places look identical to this sensor; no motion of up to "
             reason += f"{FARTHEST_M:.0f} m would decide"
+        else:
+            motion = second_look(scan)
         outputs: list[Output] = [
-            Hypotheses(scan.stamp, places),
+            Hypotheses(scan.stamp, places, self._places.belief.elsewhere),
             self._status(scan.stamp, reason, places[0].evidence),
         ]
         return [*outputs, motion] if motion is not None else outputs
 
-    def _listed_place(self, hypothesis_id: int) -> Hypothesis | None:
-        places = self._contest.places if self._contest is not None else ()
-        return next((place for place in places if place.id == hypothesis_id), None)
-
-    def _weigh_choice(
-        self, scan: LaserScan, T_odom_base: SE2, T_map_base: SE2, contest: Contest
-    ) -> Hypothesis | None:
-        """Weigh a pose that a person chose against its rivals; return another place that won."""
-        if not contest.brings_news(T_odom_base):
-            return None
-        standing = contest.look(scan, T_odom_base)
-        if standing is Standing.LOST:
-            result = self._matcher.locate(scan)
-            self._contest = self._contest_of(result.hypotheses, T_odom_base)
-        if standing is not Standing.WON:
-            return None
-        best = contest.places[0]
-        if not is_same_place(best.pose, T_map_base):
-            return best
-        self._contest = self._chosen_by = None
-        return None
-
     def _choice(self) -> str:
-        """Say who chose the pose, and what the scans say."""
-        rivals = self._contest.rivals if self._contest is not None else 1
+        """Say who chose the pose, and what the scans say; empty if the scans have decided."""
+        if self._chosen_by is None:
+            return ""
+        rivals = self._places.rivals
         fit = f"{rivals} places fit equally well" if rivals > 1 else "the scans do not decide yet"
         return f"chosen by {self._chosen_by}; {fit}"
-
-
-def _fit_words(tracked: Tracked) -> str:
-    explained = tracked.judgement.place.evidence.explained
-    if tracked.judgement.fit is Fit.UNINFORMATIVE:
-        return "the sensor sees too little: following odometry"
-    doubt = "" if tracked.judgement.fit is Fit.CONSISTENT else "doubtful: only "
-    return f"{doubt}{explained:.0%} of the beams fit"

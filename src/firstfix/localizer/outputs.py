@@ -75,6 +75,8 @@ class Hypotheses:
     places : tuple of Hypothesis
         Most likely first. Each has an `id`, which stays the same as long as the place is listed.
         While the robot rests and no other place comes up, the order stays the same, too.
+    elsewhere : float
+        Probability of a place that the belief does not hold: unmapped, or in another map.
 
     Examples
     --------
@@ -86,6 +88,7 @@ class Hypotheses:
 
     stamp: float
     places: tuple[Hypothesis, ...]
+    elsewhere: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +138,9 @@ class Status:
         the evidence has decided, 0 where no place is known.
     chosen_by : str or None
         Source of the hint that chose the published pose, until the evidence decides.
+    elsewhere : float or None
+        Probability of a place that the belief does not hold: unmapped, or in another map; None
+        before the first view.
 
     Examples
     --------
@@ -149,6 +155,7 @@ class Status:
     evidence: Evidence | None = None
     rivals: int = 0
     chosen_by: str | None = None
+    elsewhere: float | None = None
 
 
 Output = InitialPose | TrackedPose | Hypotheses | MotionRequest | Status

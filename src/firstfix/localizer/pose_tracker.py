@@ -44,6 +44,14 @@ class Tracked:
     judgement: Judgement
     is_confirmed: bool
 
+    @property
+    def fit_in_words(self) -> str:
+        """How the scan fits, for a person."""
+        explained = f"{self.judgement.place.evidence.explained:.0%} of the beams fit"
+        if self.judgement.fit is Fit.UNINFORMATIVE:
+            return "the sensor sees too little: following odometry"
+        return explained if self.judgement.fit is Fit.CONSISTENT else f"doubtful: only {explained}"
+
 
 class PoseTracker:
     """Tracks one robot in one map.

@@ -43,6 +43,7 @@ class Event(Enum):
     HINT_CONFIRMED = "hint confirmed"
     HINT_REJECTED = "hint rejected"
     RELOCALIZED = "relocalized"
+    REVOKED = "revoked"
     CONTRADICTED = "contradicted"
 
 
@@ -66,8 +67,10 @@ TABLE: dict[tuple[State, Event], State] = {
     (State.DISAMBIGUATING, Event.ODOMETRY_JUMPED): State.SEARCHING,
     (State.VERIFYING_HINT, Event.HINT_CONFIRMED): State.LOCALIZED,
     (State.VERIFYING_HINT, Event.HINT_REJECTED): State.SEARCHING,
+    (State.VERIFYING_HINT, Event.SEVERAL_PLACES_FIT): State.DISAMBIGUATING,
     (State.LOCALIZED, Event.RELOCALIZED): State.LOCALIZED,
     (State.LOCALIZED, Event.CONTRADICTED): State.SEARCHING,
+    (State.LOCALIZED, Event.REVOKED): State.DISAMBIGUATING,
     (State.LIFTED, Event.MAP_RECEIVED): State.LIFTED,
     (State.LIFTED, Event.HINT_RECEIVED): State.LIFTED,
     (State.LIFTED, Event.RESET): State.SEARCHING,

@@ -1,0 +1,237 @@
+"""The belief over all places of one map: when it is updated, and what is listed of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from enum import Enum
+
+import numpy as np
+
+from firstfix.belief.belief import (
+    NEWS_M,
+    NEWS_RAD,
+    REST_M,
+    REST_RAD,
+    begin,
+    predict,
+    update,
+    with_prior,
+)
+from firstfix.belief.config import BeliefConfig
+from firstfix.belief.prior import Prior
+from firstfix.belief.view import View
+from firstfix.core.estimate import Hypothesis, Verdict
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
+from firstfix.global_localization.places import is_same_place
+from firstfix.global_localization.verdict import count_rivals
+
+# In the background a view each two metres watches a tracked pose at little cost.
+_BACKGROUND_M = 2.0
+_BACKGROUND_RAD = math.radians(120.0)
+
+# A published pose is confirmed by so many views; from then on the background is enough.
+_CONFIRMING_VIEWS = 4
+
+# A published pose with less probability than this in two consecutive views is withdrawn.
+_WITHDRAWN_SHARE = 0.05
+_WITHDRAWING_VIEWS = 2
+
+# Views of a robot that creeps are nearly one view, and would fill the belief's window.
+_CREEPING_PAUSES = 5.0
+
+
+class Pace(Enum):
+    """How often a scan is used."""
+
+    EVERY_SCAN = "every scan"
+    EVERY_VIEW = "after 0.3 m or 15 degrees"
+    AT_REST_TOO = "every view, and now and then while the robot rests"
+    BACKGROUND = "after 2 m or 120 degrees"
+
+
+class Support(Enum):
+    """What the belief says of a pose that has been published."""
+
+    SAME_PLACE = "the most likely place"
+    OTHER_PLACE = "another place is sure"
+    OPEN = "undecided"
+    WITHDRAWN = "too unlikely"
+
+
+class PlaceBelief:
+    """Holds the belief of one map.
+
+    Parameters
+    ----------
+    fields : MapFields
+        The prepared map.
+    config : BeliefConfig
+        Settings of the belief.
+    rest_period_s : float
+        Time between two updates while the robot rests, s.
+    """
+
+    def __init__(self, fields: MapFields, config: BeliefConfig, rest_period_s: float) -> None:
+        self._fields = fields
+        self._config = config
+        self._rest_period_s = rest_period_s
+        self._used_at: tuple[float, SE2] | None = None
+        self._places: tuple[Hypothesis, ...] = ()
+        self._views_since_fix = 0
+        self._views_against = 0
+        self.belief = begin(fields, None, config)
+
+    @property
+    def is_blind(self) -> bool:
+        """True if no scan so far had enough beams on surfaces."""
+        return not self.belief.window
+
+    @property
+    def places(self) -> tuple[Hypothesis, ...]:
+        """The places worth listing at the last update, most likely first, with stable ids."""
+        return self._places
+
+    @property
+    def rivals(self) -> int:
+        """Number of places that fit about as well as the best one, priors left out."""
+        return count_rivals(self.belief.evidence) if len(self.belief.evidence) else 0
+
+    @property
+    def is_decided_by_evidence(self) -> bool:
+        """True if the most likely place is sure with all priors left out."""
+        shares = self.belief.evidence
+        return len(shares) > 0 and bool(shares[0] >= self._config.sure_probability)
+
+    def restart(self, prior: Prior | None = None) -> None:
+        """Discard all views.
+
+        Parameters
+        ----------
+        prior : Prior, optional
+            Of the pose at the next view.
+
+        Raises
+        ------
+        InputError
+            If the prior does not fit the map. The belief stays as it was.
+        """
+        fresh = begin(self._fields, prior, self._config)
+        # A number that was given to a place is never given to another one.
+        self.belief = replace(fresh, next_id=self.belief.next_id)
+        self._used_at, self._places = None, ()
+
+    def add_prior(self, prior: Prior) -> None:
+        """Add a prior of the present pose.
+
+        Raises
+        ------
+        InputError
+            If the prior does not fit the map. The belief stays as it was.
+        """
+        self.belief = with_prior(self.belief, prior, self.belief.odometry)
+
+    def update(self, scan: LaserScan, T_odom_base: SE2, pace: Pace) -> bool:
+        """Predict, and weigh all places by a scan if one is due.
+
+        Parameters
+        ----------
+        scan : LaserScan
+            The scan.
+        T_odom_base : SE2
+            Odometry at the scan.
+        pace : Pace
+            When a scan is due.
+
+        Returns
+        -------
+        bool
+            True if the scan was used.
+        """
+        moved = self._has_moved(T_odom_base, REST_M, REST_RAD)
+        if not self._is_due(scan, T_odom_base, pace):
+            self.belief = predict(self.belief, T_odom_base)
+            return False
+        self._used_at = scan.stamp, T_odom_base
+        self.belief = update(self.belief, View.of(scan, T_odom_base))
+        listed = self.belief.places
+        self._places = listed if moved else _in_order_of(self._places, listed)
+        return self.is_blind or _hits(scan) >= FEWEST_HITS
+
+    def pose_was_published(self) -> None:
+        """Watch closely at first: the pose may be wrong."""
+        self._views_since_fix = self._views_against = 0
+
+    @property
+    def tracking_pace(self) -> Pace:
+        """How often to weigh all places while a pose is tracked."""
+        is_young = self._views_since_fix < _CONFIRMING_VIEWS
+        return Pace.EVERY_VIEW if is_young else Pace.BACKGROUND
+
+    def support_for(self, T_map_base: SE2) -> Support:
+        """Compare a published pose with the belief; call it once after each update.
+
+        Parameters
+        ----------
+        T_map_base : SE2
+            The pose.
+
+        Returns
+        -------
+        Support
+            WITHDRAWN needs two consecutive views.
+        """
+        self._views_since_fix += 1
+        poses = [SE2.from_array(pose) for pose in self.belief.poses]
+        here = [is_same_place(pose, T_map_base) for pose in poses]
+        if here and here[0]:
+            self._views_against = 0
+            return Support.SAME_PLACE
+        if self.belief.verdict is Verdict.UNIQUE:
+            return Support.OTHER_PLACE
+        share = float(self.belief.probabilities[here].sum())
+        is_against = share < _WITHDRAWN_SHARE and self.belief.elsewhere < 0.5
+        self._views_against = self._views_against + 1 if is_against else 0
+        is_withdrawn = self._views_against >= _WITHDRAWING_VIEWS
+        return Support.WITHDRAWN if is_withdrawn else Support.OPEN
+
+    def _is_due(self, scan: LaserScan, T_odom_base: SE2, pace: Pace) -> bool:
+        if self._used_at is None or pace is Pace.EVERY_SCAN:
+            return True
+        if pace is Pace.BACKGROUND:
+            return self._has_moved(T_odom_base, _BACKGROUND_M, _BACKGROUND_RAD)
+        if self._has_moved(T_odom_base, NEWS_M, NEWS_RAD):
+            return True
+        if pace is Pace.EVERY_VIEW:
+            return False
+        creeps = self._has_moved(T_odom_base, REST_M, REST_RAD)
+        pause = self._rest_period_s * (_CREEPING_PAUSES if creeps else 1.0)
+        return not 0.0 <= scan.stamp - self._used_at[0] < pause
+
+    def _has_moved(self, T_odom_base: SE2, distance: float, angle: float) -> bool:
+        if self._used_at is None:
+            return True
+        step = self._used_at[1].inverse() @ T_odom_base
+        return math.hypot(step.x, step.y) >= distance or abs(step.yaw) >= angle
+
+
+def _in_order_of(
+    before: tuple[Hypothesis, ...], listed: tuple[Hypothesis, ...]
+) -> tuple[Hypothesis, ...]:
+    """Return the earlier list if the rivals are the same: at rest nothing new is known of them."""
+    if not before or _rival_ids(before) != _rival_ids(listed):
+        return listed
+    return before
+
+
+def _rival_ids(places: tuple[Hypothesis, ...]) -> frozenset[int | None]:
+    rivals = count_rivals(np.array([place.probability for place in places]))
+    likeliest = sorted(places, key=lambda place: -place.probability)[:rivals]
+    return frozenset(place.id for place in likeliest)
+
+
+def _hits(scan: LaserScan) -> int:
+    return int(np.count_nonzero(usable_beams(scan).hit))
