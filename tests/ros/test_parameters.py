@@ -10,6 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from firstfix.amcl.config import AmclConfig, MotionModel, SensorModel
+from firstfix.belief.config import BeliefConfig
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.config import LocateConfig
@@ -27,6 +28,7 @@ def test_every_setting_is_a_parameter_and_every_parameter_a_setting():
     expected = {entry.name for owner in (NodeConfig, AmclConfig) for entry in fields(owner)}
     expected |= {f"locate.{entry.name}" for entry in fields(LocateConfig)}
     expected |= {f"monitor.{entry.name}" for entry in fields(MonitorConfig)}
+    expected |= {f"belief.{entry.name}" for entry in fields(BeliefConfig)}
     expected -= {"localizer", "initial_pose"}
     expected |= {"initial_pose.x", "initial_pose.y", "initial_pose.yaw"}
     assert set(BY_NAME) == expected
