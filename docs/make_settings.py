@@ -1,13 +1,20 @@
-"""Writes docs/reference/settings.md from the dataclasses: ``python docs/make_settings.py``."""
+"""Writes docs/reference/settings.md, and the table of topics in docs/ros.md, from the code.
+
+``python docs/make_settings.py``
+"""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
 
+from firstfix.ros.channels import PARTICLES, published_topics, subscribed_topics
+from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.parameters import Parameter, parameters
 
 PAGE = Path(__file__).parent / "reference" / "settings.md"
+ROS_PAGE = Path(__file__).parent / "ros.md"
+MARK = "<!-- topics, by docs/make_settings.py -->"
 HEAD = """# Settings
 
 Of the nodes (`firstfix ros1`, `ros2`, `dds`), as private parameters; and of `firstfix track
@@ -22,6 +29,26 @@ that check them.
 def page() -> str:
     """Return the whole page."""
     return HEAD + "".join(_row(parameter) for parameter in parameters())
+
+
+def topics() -> str:
+    """Return the table of topics between its marks in docs/ros.md."""
+    full, bootstrap = NodeConfig(mode=Mode.FULL), NodeConfig()
+    published = [*published_topics(bootstrap, PARTICLES), *published_topics(full, PARTICLES)]
+    rows = [("in", topic) for topic in subscribed_topics(full).values()]
+    rows += [("out", topic) for topic in dict.fromkeys(published)]
+    lines = ["| | topic | type | delivery | content |\n|---|---|---|---|---|\n"]
+    lines += [
+        f"| {way} | `{t.name}` | `{t.type_name}` | {t.delivery.value} | {t.meaning} |\n"
+        for way, t in rows
+    ]
+    return MARK + "\n" + "".join(lines) + MARK
+
+
+def with_topics(text: str) -> str:
+    """Return a page with the table of topics between its marks brought up to date."""
+    before, _, after = text.split(MARK)
+    return before + topics() + after
 
 
 def _row(parameter: Parameter) -> str:
@@ -45,3 +72,4 @@ def _range(parameter: Parameter) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(page(), encoding="utf-8")
+    ROS_PAGE.write_text(with_topics(ROS_PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -43,6 +43,11 @@ def test_settings_are_those_of_the_dataclasses():
     assert written == script("make_settings").page(), "run: python docs/make_settings.py"
 
 
+def test_the_table_of_topics_is_current():
+    page = (DOCS / "ros.md").read_text(encoding="utf-8")
+    assert page == script("make_settings").with_topics(page), "run: python docs/make_settings.py"
+
+
 def test_the_import_graph_is_current():
     graph = script("make_import_graph")
     page = graph.PAGE.read_text(encoding="utf-8")

@@ -7,8 +7,7 @@ import pytest
 import yaml
 
 from firstfix.ros.arguments import names_from, settings_from
-from firstfix.ros.channels import PARTICLES, published_topics, subscribed_topics
-from firstfix.ros.node_config import Mode, NodeConfig
+from firstfix.ros.node_config import Mode
 from firstfix.ros.parameters import configured, flattened, parameters
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,26 +23,6 @@ def table(title: str) -> list[list[str]]:
     ]
     width = len(rows[0])
     return [[cell.strip() for cell in row] for row in rows[2:] if len(row) == width]
-
-
-def test_topics_are_those_of_the_node() -> None:
-    told = {
-        (way, name.split("`")[1], kind.strip("`"), delivery)
-        for way, name, kind, delivery in table("Topics")
-    }
-    full = NodeConfig(mode=Mode.FULL)
-    said = [*published_topics(NodeConfig(), PARTICLES), *published_topics(full, PARTICLES)]
-    deliveries = {
-        "SENSOR": "best effort",
-        "RELIABLE": "reliable",
-        "LATCHED": "reliable, latched",
-        "LATCHED_MANY": "reliable, latched",
-    }
-    assert told == {
-        (way, topic.name, topic.type_name, deliveries[topic.delivery.name])
-        for way, topics in (("in", subscribed_topics(full).values()), ("out", said))
-        for topic in topics
-    }
 
 
 def test_defaults_are_those_of_the_node() -> None:

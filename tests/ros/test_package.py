@@ -1,11 +1,14 @@
 """The wheel as a package of ROS: marker, package.xml, launch files, parameters, scripts."""
 
 import importlib.util
+import json
+import re
 import stat
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -13,7 +16,8 @@ import pytest
 import yaml
 
 from firstfix import __version__
-from firstfix.ros.node_config import NodeConfig
+from firstfix.ros.channels import PARTICLES, Delivery, published_topics, subscribed_topics
+from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.parameters import configured, flattened, parameters
 
 if sys.version_info >= (3, 11):
@@ -85,10 +89,10 @@ def test_the_file_of_parameters_has_all_of_them_with_their_defaults() -> None:
 
 
 @pytest.fixture
-def launch_file(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """Load the launch file; launch can be had as little as rclpy, and is played by dictionaries."""
-    names = ("launch", "launch.actions", "launch.substitutions", "launch_ros", "launch_ros.actions")
-    for name in names:
+def launch_file(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
+    """Give what loads a launch file; dictionaries stand in for launch, which PyPI does not have."""
+    names = ["launch", "launch.actions", "launch.substitutions", "launch_ros", "launch_ros.actions"]
+    for name in [*names, "nav2_common", "nav2_common.launch"]:
         monkeypatch.setitem(sys.modules, name, ModuleType(name))
     sys.modules["launch"].LaunchDescription = list
     actions = sys.modules["launch.actions"]
@@ -98,18 +102,18 @@ def launch_file(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
         perform=lambda context: context[name]
     )
     sys.modules["launch_ros.actions"].Node = lambda **given: given
+    sys.modules["nav2_common.launch"].RewrittenYaml = lambda **given: given
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    return load(ROS / "launch" / "firstfix.launch.py")
+    return lambda name: load(ROS / "launch" / name)
 
 
-def launched(launch_file: ModuleType, **asked: str) -> dict:
-    *declared, start = launch_file.generate_launch_description()
-    (node,) = start(dict(declared) | asked)
-    return node
+def launched(file: ModuleType, **asked: str) -> list[dict]:
+    *declared, start = file.generate_launch_description()
+    return start(dict(declared) | asked)
 
 
-def test_launched_without_arguments_it_starts_itself(launch_file: ModuleType) -> None:
-    node = launched(launch_file)
+def test_launched_without_arguments_it_starts_itself(launch_file: Callable) -> None:
+    (node,) = launched(launch_file("firstfix.launch.py"))
     assert (node["package"], node["executable"]) == ("firstfix", "firstfix_node")
     assert node["name"] == "firstfix"
     file, asked = node["parameters"]
@@ -117,9 +121,9 @@ def test_launched_without_arguments_it_starts_itself(launch_file: ModuleType) ->
     assert asked == {"use_sim_time": False, "autostart": True}
 
 
-def test_launched_with_arguments_it_passes_on_what_was_asked(launch_file: ModuleType) -> None:
+def test_launched_with_arguments_it_passes_on_what_was_asked(launch_file: Callable) -> None:
     given = {"mode": "full", "map": "map.yaml", "use_sim_time": "True", "autostart": "false"}
-    node = launched(launch_file, namespace="robot1", **given)
+    (node,) = launched(launch_file("firstfix.launch.py"), namespace="robot1", **given)
     asked = node["parameters"][1]
     assert asked.pop("use_sim_time") is True
     assert asked.pop("autostart") is False
@@ -127,6 +131,37 @@ def test_launched_with_arguments_it_passes_on_what_was_asked(launch_file: Module
     assert config.mode.value == "full"
     assert config.yaml_filename == str(Path("map.yaml").absolute())
     assert node["namespace"] == "robot1"
+
+
+def test_nav2s_localization_is_replaced_under_its_own_names(launch_file: Callable) -> None:
+    """So that a stock bringup and nav2_params.yaml stay as they are, but for the file included."""
+    given = {"map": "map.yaml", "params_file": "nav2_params.yaml", "namespace": "robot1"}
+    server, ours, manager = launched(launch_file("localization.launch.py"), **given)
+    assert (ours["package"], ours["executable"]) == ("firstfix", "firstfix_node")
+    assert manager["parameters"][0]["node_names"] == [server["name"], ours["name"]]
+    assert ours["name"] == "amcl"  # the section of nav2_params.yaml
+    file, asked = ours["parameters"]
+    assert (file["source_file"], file["root_key"]) == ("nav2_params.yaml", "robot1")
+    assert asked == {"use_sim_time": False, "mode": "full"}
+    assert server["parameters"][1] == {"use_sim_time": False, "yaml_filename": "map.yaml"}
+    assert {node["namespace"] for node in (server, ours, manager)} == {"robot1"}
+
+
+def test_viewers_are_set_up_for_the_topics_of_the_node() -> None:
+    config = NodeConfig(mode=Mode.FULL)
+    topics = [*subscribed_topics(config).values(), *published_topics(config, PARTICLES)]
+    known = {"/" + topic.name.removeprefix("/"): topic.delivery for topic in topics}
+    rviz = yaml.safe_load((ROS / "rviz" / "firstfix.rviz").read_text())
+    for display in rviz["Visualization Manager"]["Displays"]:
+        topic = display["Topic"]
+        delivery = known[topic["Value"]]
+        assert (topic["Reliability Policy"] == "Best Effort") == (delivery is Delivery.SENSOR)
+        assert (topic["Durability Policy"] == "Transient Local") == (delivery is Delivery.LATCHED)
+    layout = json.loads((ROS / "foxglove" / "firstfix.json").read_text())
+    panels = layout["configById"]
+    assert set(panels["3D!firstfix"]["topics"]) <= set(known)
+    for panel in re.findall(r'"([^"]*!\w+)"', json.dumps(layout["layout"])):
+        assert panel in panels
 
 
 def test_the_script_starts_the_command_of_its_environment(tmp_path: Path) -> None:

@@ -155,11 +155,12 @@ def _settings_of(arguments: list[str], map_file: str) -> tuple[NodeConfig, Names
 
 def _load(name: str) -> ModuleType:
     library, remedy = _NEEDED[name]
+    expected = f"{library} in this Python"
     try:
+        importlib.import_module(library)
+        expected, remedy = f"all modules of the node for {name}", "install it"
         return importlib.import_module(_MODULES[name])
     except ModuleNotFoundError as error:
         raise InputError(
-            expected=f"{library} in this Python",
-            received=f"no module {error.name}",
-            remedy=remedy,
+            expected=expected, received=f"no module {error.name}", remedy=remedy
         ) from error

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from firstfix.ros.node_config import Mode, NodeConfig
@@ -29,11 +29,14 @@ class Topic:
         ``package/Type``; the transport knows the package of Kobuki's events.
     delivery : Delivery
         Quality of service.
+    meaning : str
+        One line for the documents.
     """
 
     name: str
     type_name: str
     delivery: Delivery
+    meaning: str = field(default="", compare=False)
 
 
 class Channel(Enum):
@@ -56,16 +59,43 @@ class Channel(Enum):
 
 POSE_TYPE = "geometry_msgs/PoseWithCovarianceStamped"
 
-INITIAL_POSE = Topic("initialpose", POSE_TYPE, Delivery.RELIABLE)
-AMCL_POSE = Topic("amcl_pose", POSE_TYPE, Delivery.LATCHED)
-TF = Topic("/tf", "tf2_msgs/TFMessage", Delivery.RELIABLE)
-PARTICLES = Topic("particle_cloud", "nav2_msgs/ParticleCloud", Delivery.SENSOR)
+INITIAL_POSE = Topic(
+    "initialpose", POSE_TYPE, Delivery.RELIABLE, "the pose, once it is found (bootstrap)"
+)
+AMCL_POSE = Topic("amcl_pose", POSE_TYPE, Delivery.LATCHED, "the pose at every scan (full)")
+TF = Topic("/tf", "tf2_msgs/TFMessage", Delivery.RELIABLE, "`map -> odom` (full)")
+PARTICLES = Topic(
+    "particle_cloud",
+    "nav2_msgs/ParticleCloud",
+    Delivery.SENSOR,
+    "the particles, while somebody subscribes (full)",
+)
 # RViz of ROS 1 can display this type, and it exists where nav2_msgs is not installed.
-PARTICLE_POSES = Topic("particle_cloud", "geometry_msgs/PoseArray", Delivery.SENSOR)
-HYPOTHESES = Topic("hypotheses", "geometry_msgs/PoseArray", Delivery.LATCHED)
-MARKERS = Topic("hypothesis_markers", "visualization_msgs/MarkerArray", Delivery.RELIABLE)
-LOCALIZED = Topic("localized", "std_msgs/Bool", Delivery.LATCHED)
-STATUS = Topic("localization_status", "diagnostic_msgs/DiagnosticArray", Delivery.LATCHED)
+PARTICLE_POSES = replace(PARTICLES, type_name="geometry_msgs/PoseArray")
+HYPOTHESES = Topic(
+    "hypotheses",
+    "geometry_msgs/PoseArray",
+    Delivery.LATCHED,
+    "the places that fit, best first; empty once one is decided",
+)
+MARKERS = Topic(
+    "hypothesis_markers",
+    "visualization_msgs/MarkerArray",
+    Delivery.RELIABLE,
+    "these places with their probabilities, while somebody subscribes",
+)
+LOCALIZED = Topic(
+    "localized",
+    "std_msgs/Bool",
+    Delivery.LATCHED,
+    "true while the pose can be used; published when it changes",
+)
+STATUS = Topic(
+    "localization_status",
+    "diagnostic_msgs/DiagnosticArray",
+    Delivery.LATCHED,
+    "state, reason and evidence",
+)
 
 
 def subscribed_topics(config: NodeConfig) -> dict[Channel, Topic]:
@@ -81,20 +111,30 @@ def subscribed_topics(config: NodeConfig) -> dict[Channel, Topic]:
     dict of Channel to Topic
         Services are not among them.
     """
+    sensor, reliable = Delivery.SENSOR, Delivery.RELIABLE
+    scan, grid, press = "sensor_msgs/LaserScan", "nav_msgs/OccupancyGrid", "the robot was lifted"
     topics = {
-        Channel.SCAN: Topic(config.scan_topic, "sensor_msgs/LaserScan", Delivery.SENSOR),
-        Channel.TF: TF,
-        Channel.TF_STATIC: Topic("/tf_static", "tf2_msgs/TFMessage", Delivery.LATCHED_MANY),
-        Channel.ODOM: Topic("odom", "nav_msgs/Odometry", Delivery.SENSOR),
-        Channel.INITIAL_POSE: INITIAL_POSE,
-        Channel.CLIFF: Topic("events/cliff", "kobuki/CliffEvent", Delivery.RELIABLE),
-        Channel.WHEEL_DROP: Topic("events/wheel_drop", "kobuki/WheelDropEvent", Delivery.RELIABLE),
-        Channel.BUMPER: Topic("events/bumper", "kobuki/BumperEvent", Delivery.RELIABLE),
-        Channel.KIDNAPPED: Topic("kidnapped", "std_msgs/Bool", Delivery.RELIABLE),
+        Channel.SCAN: Topic(config.scan_topic, scan, sensor, "the scans"),
+        Channel.TF: replace(TF, meaning="odometry, and sensors that move on the robot"),
+        Channel.TF_STATIC: Topic(
+            "/tf_static", "tf2_msgs/TFMessage", Delivery.LATCHED_MANY, "where the sensor is mounted"
+        ),
+        Channel.ODOM: Topic(
+            "odom", "nav_msgs/Odometry", sensor, "odometry of robots that do not have it on `/tf`"
+        ),
+        Channel.INITIAL_POSE: replace(INITIAL_POSE, meaning="a hint of a person, such as in RViz"),
+        Channel.CLIFF: Topic("events/cliff", "kobuki/CliffEvent", reliable, press),
+        Channel.WHEEL_DROP: Topic("events/wheel_drop", "kobuki/WheelDropEvent", reliable, press),
+        Channel.BUMPER: Topic(
+            "events/bumper", "kobuki/BumperEvent", reliable, "a collision (has no effect yet)"
+        ),
+        Channel.KIDNAPPED: Topic(
+            "kidnapped", "std_msgs/Bool", reliable, "true: the robot was lifted; false: set down"
+        ),
     }
     if not config.yaml_filename:
-        map_topic = Topic(config.map_topic, "nav_msgs/OccupancyGrid", Delivery.LATCHED)
-        topics[Channel.MAP] = map_topic
+        meaning = "the map, unless `yaml_filename` names a file"
+        topics[Channel.MAP] = Topic(config.map_topic, grid, Delivery.LATCHED, meaning)
     return topics
 
 
