@@ -50,10 +50,20 @@ def test_parameters_of_the_example_are_right() -> None:
     assert configured(values).mode is Mode.FULL
 
 
-def test_the_launch_file_of_the_example_is_python() -> None:
+def test_the_launch_file_of_the_example_is_installed() -> None:
     (text,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    compile(text, "localization.launch.py", "exec")
-    assert '"node_names": ["map_server", "firstfix"]' in text
+    compile(text, "bringup.launch.py", "exec")
+    (name,) = re.findall(r'"([\w.]+launch\.py)"', text)
+    assert (ROOT / "ros" / "launch" / name).is_file()
+
+
+def test_keys_of_the_status_are_those_of_the_node() -> None:
+    code = (ROOT / "src" / "firstfix" / "ros" / "output_publisher.py").read_text()
+    chapter = PAGE.split("### Keys of `localization_status`")[1].split("\n## ")[0]
+    keys = re.findall(r"`(\w+)`", " ".join(re.findall(r"^\|([^|]*)\|", chapter, re.MULTILINE)))
+    assert len(keys) == 10
+    for key in keys:
+        assert f'"{key}"' in code
 
 
 @pytest.mark.parametrize(
