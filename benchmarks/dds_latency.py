@@ -42,7 +42,7 @@ from firstfix.ros.channels import (
     Topic,
     subscribed_topics,
 )
-from firstfix.ros.dds.endpoints import Receiver, Sender, Watch
+from firstfix.ros.dds.endpoints import EventThread, Receiver, Sender
 from firstfix.ros.dds.types import decode, make
 from firstfix.ros.names import Names
 from firstfix.ros.node_config import NodeConfig
@@ -131,7 +131,7 @@ class Poses:
         self._receiver = Receiver(robot.participant, topic, dds_name(topic))
         self._kind = topic.type_name
         self._changed = threading.Event()
-        self._watch = Watch(robot.participant, [self._receiver.news], self._take, print)
+        self._thread = EventThread(robot.participant, [self._receiver.news], self._take, print)
 
     def wait(self) -> float:
         """Return when the next one arrives."""
@@ -142,7 +142,7 @@ class Poses:
 
     def close(self) -> None:
         """Listen no more."""
-        self._watch.close()
+        self._thread.close()
 
     def _take(self) -> None:
         now = time.time()

@@ -39,7 +39,9 @@ def test_every_disturbance_has_time_after_it() -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_this_process")
-def test_a_world_is_played_and_told(cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_world_is_simulated_and_reported(
+    cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(kidnap_scripts, "_NOTHING_S", 20.0)
     arguments = ["--worlds", "house", "--scenarios", 2, "--seed", 5, "--jobs", 2]
     ended = cli("bench", "--kidnap", *arguments, "--json", "k.json", "--report", "out")
@@ -58,15 +60,15 @@ def test_a_world_is_played_and_told(cli, tmp_path: Path, monkeypatch: pytest.Mon
 
 
 @pytest.fixture(scope="module")
-def story(hall_plan: OccupancyGrid) -> list[Phase]:
+def phases(hall_plan: OccupancyGrid) -> list[Phase]:
     done = [CarryTo(seconds=1.0), Stand(12.0), Slip(), Stand(1.0), Teleport(), Stand(12.0)]
     return [Stand(1.0), *done]
 
 
-def test_what_happens_to_a_robot_reaches_the_judgement(
-    hall_plan: OccupancyGrid, story: list[Phase]
+def test_the_disturbances_of_a_scenario_are_judged(
+    hall_plan: OccupancyGrid, phases: list[Phase]
 ) -> None:
-    moments = run(Scenario(story), hall_plan, 1)
+    moments = run(Scenario(phases), hall_plan, 1)
     instants = list(localized(simulated(moments), hall_plan))
     trial = judge_trial(instants)
     assert [a.kind for a in trial.aftermaths] == ["carry", "slip", "teleport"]
@@ -81,13 +83,13 @@ def test_what_happens_to_a_robot_reaches_the_judgement(
 
 
 @pytest.mark.slow
-def test_a_spliced_drive_is_a_story_of_unsignalled_kidnaps(hall_plan: OccupancyGrid) -> None:
+def test_a_spliced_drive_has_unsignalled_kidnaps(hall_plan: OccupancyGrid) -> None:
     recording = record(run(Scenario([DriveTo(seconds=15.0), DriveTo()] * 4), hall_plan, 2))
     thin = Recording(recording.scans[::4], recording.odometry, _rows(recording.truth))
     case = Case("hall", "hall", "sim", lambda: hall_plan, lambda: thin)
-    played = KidnapCaseTask(case, (0,))()
-    assert (played.name, played.left_out) == ("hall", None)
-    (ran,) = played.runs
+    result = KidnapCaseTask(case, (0,))()
+    assert (result.name, result.left_out) == ("hall", None)
+    (ran,) = result.runs
     assert (ran.kind, ran.seed) == ("splice", 0)
     assert [a.kind for a in ran.trial.aftermaths] == ["splice"] * 4
     assert all(a.is_kidnap and not a.signalled for a in ran.trial.aftermaths)

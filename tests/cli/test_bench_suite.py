@@ -11,7 +11,7 @@ from firstfix.lab.metrics.paper_trial import Start
 
 
 @pytest.mark.slow
-def test_the_papers_experiments_are_run_and_told(cli, tmp_path: Path) -> None:
+def test_the_papers_experiments_are_run_and_reported(cli, tmp_path: Path) -> None:
     arguments = ["--worlds", "house", "--runs", 1, "--seed", 2]
     ended = cli("bench", "--suite", "paper", *arguments, "--json", "p.json", "--report", "out")
     assert ended.status == 0, ended

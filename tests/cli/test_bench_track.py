@@ -7,7 +7,7 @@ import pytest
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_cases_with_odometry_are_followed_and_others_named(
+def test_cases_with_odometry_are_tracked_and_others_named(
     cli, cases: Path, drive: Path, tmp_path: Path
 ) -> None:
     ended = cli("bench", drive, cases, "--track", "--jobs", 2, "--json", "out/bench.json")

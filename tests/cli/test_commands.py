@@ -69,7 +69,7 @@ def test_bench_takes_single_cases_and_a_limit(cli, cases: Path, tmp_path: Path) 
     assert "no scan was tried on a wrong map" in ended.err
 
 
-def test_map_check_says_what_is_in_a_map(cli, unique: Files) -> None:
+def test_map_check_describes_a_map(cli, unique: Files) -> None:
     ended = cli("map", "check", unique[0])
     assert ended.status == 0
     for text in ("200 x 160 cells, 10.00 x 8.00 m", "0.05 m per cell", "no traps found"):
@@ -202,7 +202,7 @@ def test_the_demo_takes_a_map_of_ones_own(cli, unique: Files) -> None:
     assert Path("own.svg").exists()
 
 
-def test_the_doctor_says_what_is_there(cli) -> None:
+def test_the_doctor_prints_what_is_installed(cli) -> None:
     ended = cli("doctor")
     assert ended.status == 0
     for word in ("firstfix", "python", "numpy", "numba", "matplotlib", "cache", "kernels", "ROS"):

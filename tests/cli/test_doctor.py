@@ -56,7 +56,7 @@ def test_ros_sourced_for_another_python(ros_line) -> None:
     assert "humble, no client library" in ros_line(ROS_DISTRO="humble")
 
 
-def test_variables_that_part_robots_are_told(ros_line) -> None:
+def test_variables_that_separate_robots_are_printed(ros_line) -> None:
     assert "ROS_DOMAIN_ID=42" in ros_line(ROS_DOMAIN_ID="42")
 
 
@@ -106,7 +106,7 @@ def test_kernels_that_cannot_be_kept(cli, monkeypatch) -> None:
     assert "set NUMBA_CACHE_DIR" in ended.out
 
 
-def test_any_command_says_so(cli, monkeypatch) -> None:
+def test_any_command_prints_the_advice(cli, monkeypatch) -> None:
     def raising(_path: Path) -> str:
         raise RuntimeError(NO_CACHE)
 

@@ -24,7 +24,7 @@ def strict_json(line: str) -> dict[str, Any]:
     return document
 
 
-def test_a_place_like_no_other_is_told_to_a_person(cli, unique: Files) -> None:
+def test_a_unique_place_is_described_in_text(cli, unique: Files) -> None:
     ended = cli("locate", *unique)
     assert ended.status == 0
     assert ended.out.startswith("UNIQUE: ")
@@ -120,7 +120,7 @@ def test_a_scan_without_truth_has_no_error(cli, unique: Files, tmp_path: Path) -
     assert "truth" not in cli("locate", unique[0], "blind.npz").out
 
 
-def test_a_scan_that_says_nothing_is_no_match(cli, unique: Files, tmp_path: Path) -> None:
+def test_a_scan_without_hits_is_no_match(cli, unique: Files, tmp_path: Path) -> None:
     with np.load(unique[1]) as log:
         kept = dict(log)
     kept["ranges"] = np.full_like(kept["ranges"], np.nan)

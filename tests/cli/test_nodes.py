@@ -17,7 +17,7 @@ NEEDED = {"ros1": "rospy", "ros2": "rclpy", "dds": "cyclonedds"}
 
 
 @pytest.mark.parametrize("command", NEEDED)
-def test_what_is_missing_is_told_with_a_remedy(cli, command: str) -> None:
+def test_a_missing_library_is_refused_with_a_remedy(cli, command: str) -> None:
     if importlib.util.find_spec(NEEDED[command]) is not None:
         pytest.skip(f"this Python has {NEEDED[command]}")
     ended = cli(command)
@@ -37,7 +37,7 @@ def test_ros2_passes_on_all_arguments(cli, monkeypatch: pytest.MonkeyPatch) -> N
     assert lab.world.arguments.parameters == {"mode": "full", "z_hit": 0.6}
 
 
-def test_ros2_tells_wrong_arguments_in_one_line(cli, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ros2_refuses_wrong_arguments_in_one_line(cli, monkeypatch: pytest.MonkeyPatch) -> None:
     Lab(monkeypatch)
     ended = cli("ros2", "-p", "mode:=full")
     assert ended.status == 2

@@ -72,7 +72,7 @@ def test_a_simulated_robot_is_served_until_ctrl_c() -> None:
 
 
 @pytest.mark.slow
-def test_the_robot_of_the_demo_sleeps_until_somebody_looks() -> None:
+def test_the_robot_of_the_demo_waits_for_the_first_viewer() -> None:
     with running("demo", "--world", "house", "--port", 0) as (process, url):
         wait_for(url, "SEARCHING")
         time.sleep(1.0)
@@ -156,11 +156,11 @@ def test_a_robot_whose_ros_is_not_here(cli, unique: Files, monkeypatch) -> None:
     assert_one_line(cli("serve", unique[0], "--robot", "ros2"), "rclpy", "setup.bash")
 
 
-def test_a_picture_of_the_demo_needs_the_story(cli) -> None:
+def test_a_picture_of_the_demo_needs_headless(cli) -> None:
     assert_one_line(cli("demo", "--plot", "a.png"), "--headless", "a.png")
 
 
-def test_a_browser_is_opened_only_where_somebody_sits(monkeypatch, capsys) -> None:
+def test_a_browser_is_opened_only_on_a_display(monkeypatch, capsys) -> None:
     from firstfix.cli.serve import _announce
     from firstfix.web.access_control import AccessPolicy
     from firstfix.web.server import listen

@@ -54,7 +54,7 @@ def files(drive: Path) -> tuple[Path, Path]:
     return drive / "map.yaml", drive / "scans.npz"
 
 
-def test_a_drive_is_told_to_a_person(cli, files: tuple[Path, Path]) -> None:
+def test_a_drive_is_described_in_text(cli, files: tuple[Path, Path]) -> None:
     ended = cli("track", *files)
     assert ended.status == 0
     told = f"\n{ended.out}"
@@ -272,7 +272,7 @@ def test_wrong_input_leaves_earlier_results_alone(
         ("intel_lab", "intel.carmen.log.gz", "0.67,-0.04,-0.355"),
     ],
 )
-def test_logs_of_real_robots_are_followed(
+def test_logs_of_real_robots_are_tracked(
     cli, shared: Path, case: str, log: str, start: str
 ) -> None:
     map_path = shared / "cases" / case / "map.yaml"
@@ -303,7 +303,7 @@ def test_a_search_needs_no_start(cli, files: tuple[Path, Path]) -> None:
 
 
 @pytest.mark.slow
-def test_a_search_that_finds_nothing_says_why(
+def test_a_search_that_finds_nothing_gives_the_reason(
     cli, files: tuple[Path, Path], alike: tuple[Path, Path]
 ) -> None:
     ended = cli("track", alike[0], files[1], "--start", "search", "--out", "never.tum")

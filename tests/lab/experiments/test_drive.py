@@ -40,7 +40,7 @@ def test_a_start_that_is_given_counts_more_than_the_truth(log: Recording) -> Non
     assert plan_drive(log, SE2(1.0, 2.0, 3.0)).begin_at == SE2(1.0, 2.0, 3.0)
 
 
-def test_every_run_begins_anew_where_its_truth_is_known(log: Recording) -> None:
+def test_every_run_restarts_where_its_truth_is_known(log: Recording) -> None:
     runs = replace(log, runs=np.array([0, 0, 1, 1, 2, 2]))
     drive = plan_drive(runs, None)
     assert begun(runs) == [0, 2, 4]
@@ -92,7 +92,7 @@ def test_odometry_between_two_stamps_is_interpolated(log: Recording) -> None:
     np.testing.assert_allclose(poses, np.arange(N) / 5, atol=1e-9)
 
 
-def test_without_odometry_it_is_said_what_to_record(log: Recording) -> None:
+def test_a_log_without_odometry_is_refused_with_what_to_record(log: Recording) -> None:
     blind = replace(log, odometry=None, notes=("the sensor is fixed to nothing",))
     with pytest.raises(ScanError, match=r"\(the sensor is fixed to nothing\).*record /tf"):
         plan_drive(blind, None)

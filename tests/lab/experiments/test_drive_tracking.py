@@ -44,7 +44,7 @@ def errors(tracked: list[TrackedScan]) -> list[PoseError]:
     ]
 
 
-def test_a_drive_is_followed_to_its_end(hall_plan: OccupancyGrid, driven: Recording) -> None:
+def test_a_drive_is_tracked_to_its_end(hall_plan: OccupancyGrid, driven: Recording) -> None:
     tracked = follow(hall_plan, driven)
     assert [scan.sight.index for scan in tracked] == list(range(len(driven)))
     assert max(error.metres for error in errors(tracked)) < 0.15

@@ -19,7 +19,7 @@ def test_the_machine_is_described_but_not_named() -> None:
     assert platform.node() not in machine.values()
 
 
-def test_what_is_not_known_is_said_to_be_so() -> None:
+def test_unknown_facts_are_none() -> None:
     text = machine_text(this_machine() | {"memory_gb": None, "commit": None})
     assert "memory not known" in text
     assert text.endswith("commit not known.")

@@ -47,7 +47,7 @@ def test_every_scan_has_a_belief(attempts: dict[Start, Attempt], driven: Recordi
 
 
 @pytest.mark.parametrize("start", [Start.BY_HAND, Start.PAPER, Start.FAST])
-def test_who_knows_the_place_is_right_to_the_end(
+def test_a_start_at_the_right_place_stays_right(
     attempts: dict[Start, Attempt], start: Start
 ) -> None:
     last = attempts[start].beliefs[-1]
@@ -96,7 +96,7 @@ def test_the_origin_of_every_world_is_a_place_where_a_robot_can_be() -> None:
         assert Floor(at_home(draw())).room_at(0.0, 0.0) > 0.18
 
 
-def test_the_system_lives_through_a_drive(hall_plan: OccupancyGrid, driven: Recording) -> None:
+def test_the_system_tracks_a_drive(hall_plan: OccupancyGrid, driven: Recording) -> None:
     lived = follow_with_system(driven, hall_plan)
     assert lived.start is Start.SYSTEM
     assert [belief.stamp for belief in lived.beliefs] == [scan.stamp for scan in driven.scans]

@@ -31,7 +31,7 @@ def test_a_place_is_compared_with_where_it_was_found(
     assert (None if place.double is None else place.double.pose) == double
 
 
-def test_a_scan_that_says_nothing_is_lost() -> None:
+def test_a_scan_without_a_match_is_lost() -> None:
     silent = LocateResult(Verdict.NO_MATCH, "dark", (), SearchReport(0, 0.0, proven=False), 0.0)
     assert look_from(HERE, silent).look is Look.LOST
 

@@ -43,7 +43,7 @@ def test_a_killed_process_is_an_error_not_a_wait() -> None:
         run_in_processes([partial(os._exit, 9)], 1, ignore)
 
 
-def test_an_interruption_leaves_nobody_behind() -> None:
+def test_an_interruption_leaves_no_process_behind() -> None:
     def interrupt(index: int, result: object) -> None:
         raise KeyboardInterrupt
 

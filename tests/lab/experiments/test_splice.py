@@ -88,7 +88,7 @@ def test_a_gap_or_another_run_ends_a_piece() -> None:
     assert max(np.diff([scan.stamp for scan in drive.scans])) == pytest.approx(0.5)
 
 
-def test_what_cannot_be_spliced_says_why() -> None:
+def test_a_drive_that_cannot_be_spliced_gives_the_reason() -> None:
     rng = np.random.default_rng(0)
     whole = driven_for(60.0)
     for drive, why in (

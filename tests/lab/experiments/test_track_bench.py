@@ -35,7 +35,7 @@ def run(drive_case: Case) -> TrackRun:
     return TrackTask(drive_case, AmclConfig(), 1)()
 
 
-def test_a_case_is_followed_from_its_true_start(run: TrackRun, driven: Recording) -> None:
+def test_a_case_is_tracked_from_its_true_start(run: TrackRun, driven: Recording) -> None:
     assert (run.case, run.notes) == ("drive", ())
     assert run.figures is not None
     assert run.figures.n == run.figures.scans == len(driven)

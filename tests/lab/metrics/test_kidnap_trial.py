@@ -135,7 +135,7 @@ def test_recovered_needs_10_s_before_the_next_disturbance(
     assert (trial.aftermaths[0].recovered_after_s is not None) is recovered
 
 
-def test_a_gap_in_what_is_right_begins_the_10_s_anew() -> None:
+def test_a_wrong_pose_restarts_the_10_s_of_a_recovery() -> None:
     wrong = stood(0.5, AWAY, SE2(5.0, 0.46, 0.0))
     right = stood(12.0, AWAY, SE2(5.0, 0.44, 0.0))
     trial = judge_trial(timed(CALM, after("teleport", right[:6]), wrong, right))
@@ -168,7 +168,7 @@ def alarmed(trial: Trial) -> int:
     return len(trial.alarms)
 
 
-def test_giving_up_or_finding_anew_in_calm_is_a_false_alarm() -> None:
+def test_giving_up_or_replacing_the_pose_in_calm_is_a_false_alarm() -> None:
     given_up = judge_trial(timed(CALM, stood(1.0, HOME, None), found(CALM, HOME)))
     assert alarmed(given_up) == 1  # being found after it is part of it
     anew = judge_trial(timed(CALM, found(CALM, HOME)))

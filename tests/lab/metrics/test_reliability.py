@@ -52,7 +52,7 @@ def test_a_curve_can_be_asked() -> None:
     assert curve.risk_at_coverage(0.9) is None
 
 
-def test_who_claims_nothing_has_an_empty_curve() -> None:
+def test_probabilities_of_0_have_an_empty_curve() -> None:
     curve = risk_curve(np.zeros(3), np.zeros(3, bool), NONE)
     assert len(curve.thresholds) == 0
     assert curve.coverage_at_risk(0.5) == 0.0

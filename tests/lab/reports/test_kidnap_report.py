@@ -93,7 +93,7 @@ def test_tables_show_every_row_aligned(runs: list[KidnapRun]) -> None:
         assert len({len(line) for line in lines}) == 1
 
 
-def test_incidents_tell_what_was_said_around_them() -> None:
+def test_incidents_have_the_messages_around_them() -> None:
     home, away = SE2(0.0, 0.0, 0.0), SE2(4.0, 0.0, 0.0)
     instants = [
         Instant(

@@ -1,4 +1,4 @@
-"""The picture of a story."""
+"""The picture of the demo."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from firstfix.lab.scenarios.demo import DemoStep
 from firstfix.localizer.precompile import small_room
 
 
-def story() -> list[DemoStep]:
+def demo_steps() -> list[DemoStep]:
     def step(i: int, episode: int, *, published: bool) -> DemoStep:
         pose = SE2(1.0 + 0.1 * i, 2.0 + episode, 0.0)
         found = pose if i == 0 else None
@@ -25,16 +25,16 @@ def story() -> list[DemoStep]:
 
 
 @pytest.mark.slow
-def test_a_story_is_drawn(tmp_path: Path) -> None:
-    path = draw_scenario(small_room(), story(), tmp_path / "story.png")
-    assert path == tmp_path / "story.png"
+def test_a_demo_is_drawn(tmp_path: Path) -> None:
+    path = draw_scenario(small_room(), demo_steps(), tmp_path / "demo.png")
+    assert path == tmp_path / "demo.png"
     assert path.read_bytes().startswith(b"\x89PNG")
-    svg = draw_scenario(small_room(), story(), tmp_path / "story.svg").read_text()
+    svg = draw_scenario(small_room(), demo_steps(), tmp_path / "demo.svg").read_text()
     for words in ("truth", "published", "carried away", "found"):
         assert words in svg
 
 
-def test_a_story_without_any_pose_is_drawn(tmp_path: Path) -> None:
+def test_a_demo_without_any_pose_is_drawn(tmp_path: Path) -> None:
     steps = [DemoStep(0.1 * i, SE2(2.0, 2.0, 0.0), None, None, 0, False, 0) for i in range(3)]
     assert draw_scenario(small_room(), steps, tmp_path / "none.png").exists()
 
@@ -42,4 +42,4 @@ def test_a_story_without_any_pose_is_drawn(tmp_path: Path) -> None:
 def test_a_folder_that_is_none(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError):
-        draw_scenario(small_room(), story(), tmp_path / "file" / "story.png")
+        draw_scenario(small_room(), demo_steps(), tmp_path / "file" / "demo.png")

@@ -37,7 +37,7 @@ def test_right_is_half_a_metre_and_ten_degrees(off: SE2, *, right: bool) -> None
     assert step(0.0, HERE @ off).is_right is right
 
 
-def test_a_robot_that_is_found_at_once_and_followed() -> None:
+def test_a_robot_that_is_found_at_once_and_tracked() -> None:
     episode = one_episode(step(3.0, initial=HERE), step(3.1), step(3.2, HERE @ SE2(0.1, 0.0, 0.0)))
     assert (episode.began_s, episode.noticed_s, episode.found_s, episode.wrong_finds) == (
         3.0,
@@ -84,7 +84,7 @@ def test_time_counts_from_when_the_robot_stands_again() -> None:
     assert episode.found_s == pytest.approx(0.1)
 
 
-def test_acts_are_told_apart() -> None:
+def test_episodes_are_separated() -> None:
     episodes = summarize_episodes(
         [step(0.0), step(0.1, episode=1), step(0.2, ELSEWHERE, episode=2)]
     )

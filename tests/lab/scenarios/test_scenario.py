@@ -1,4 +1,4 @@
-"""A script, a map and a seed make one story."""
+"""A script, a map and a seed make one moments."""
 
 import itertools
 import math
@@ -38,7 +38,7 @@ def flat() -> OccupancyGrid:
 
 
 @pytest.fixture(scope="module")
-def story(flat: OccupancyGrid) -> list[Moment]:
+def moments(flat: OccupancyGrid) -> list[Moment]:
     return list(run(Scenario(EVERYTHING, start=SE2(1.0, 1.0, 0.5)), flat, seed=1))
 
 
@@ -46,37 +46,35 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(0)
 
 
-def told(story: list[Moment]) -> list[object]:
+def reports(moments: list[Moment]) -> list[object]:
     """Make events comparable."""
     return [
         (event.stamp, event.ranges.tolist()) if isinstance(event, LaserScan) else event
-        for moment in story
+        for moment in moments
         for event in moment.events
     ]
 
 
-def test_one_seed_tells_one_story_and_another_seed_another(
-    flat: OccupancyGrid, story: list[Moment]
-) -> None:
+def test_a_seed_determines_the_scenario(flat: OccupancyGrid, moments: list[Moment]) -> None:
     script = Scenario(EVERYTHING, start=SE2(1.0, 1.0, 0.5))
-    assert told(list(run(script, flat, seed=1))) == told(story)
-    assert told(list(run(script, flat, seed=2))) != told(story)
+    assert reports(list(run(script, flat, seed=1))) == reports(moments)
+    assert reports(list(run(script, flat, seed=2))) != reports(moments)
 
 
-def test_events_come_in_the_order_of_their_stamps(story: list[Moment]) -> None:
-    stamps = [event.stamp for moment in story for event in moment.events]
+def test_events_come_in_the_order_of_their_stamps(moments: list[Moment]) -> None:
+    stamps = [event.stamp for moment in moments for event in moment.events]
     assert stamps == sorted(stamps)
-    np.testing.assert_allclose([m.stamp for m in story], 0.1 * np.arange(len(story)), atol=1e-9)
-    for moment in story:
+    np.testing.assert_allclose([m.stamp for m in moments], 0.1 * np.arange(len(moments)), atol=1e-9)
+    for moment in moments:
         (scan,) = (event for event in moment.events if isinstance(event, LaserScan))
         assert scan.stamp == moment.stamp
         assert sum(isinstance(event, Odometry) for event in moment.events) == 5
 
 
 def test_phases_follow_one_another_and_what_was_done_to_the_robot_is_marked(
-    story: list[Moment],
+    moments: list[Moment],
 ) -> None:
-    phases = [m.phase for m in story]
+    phases = [m.phase for m in moments]
     assert [p for i, p in enumerate(phases) if i == 0 or phases[i - 1] != p] == [
         "stand",
         "drive",
@@ -84,35 +82,35 @@ def test_phases_follow_one_another_and_what_was_done_to_the_robot_is_marked(
         "carry",
         "stand",
     ]
-    marked = [(m.phase, m.disturbance) for m in story if m.disturbance is not None]
+    marked = [(m.phase, m.disturbance) for m in moments if m.disturbance is not None]
     assert marked == [("stand", Disturbance.TELEPORTED), ("stand", Disturbance.CARRIED)]
 
 
-def test_a_drive_ends_at_its_goal(story: list[Moment]) -> None:
-    end = next(m for m in story if m.disturbance is Disturbance.TELEPORTED)
-    before = story[story.index(end) - 1].T_map_base
+def test_a_drive_ends_at_its_goal(moments: list[Moment]) -> None:
+    end = next(m for m in moments if m.disturbance is Disturbance.TELEPORTED)
+    before = moments[moments.index(end) - 1].T_map_base
     assert before.distance_to(SE2(4.0, 1.0, 0.0)) < 0.15
 
 
-def test_neither_teleport_nor_carrying_is_seen_by_the_wheels(story: list[Moment]) -> None:
-    odometry = [e.T_odom_base for m in story for e in m.events if isinstance(e, Odometry)]
+def test_the_wheels_count_neither_teleports_nor_carrying(moments: list[Moment]) -> None:
+    odometry = [e.T_odom_base for m in moments for e in m.events if isinstance(e, Odometry)]
     steps = [a.distance_to(b) for a, b in itertools.pairwise(odometry)]
     assert max(steps) < 0.02
-    truth = [m.T_map_base for m in story]
+    truth = [m.T_map_base for m in moments]
     assert max(a.distance_to(b) for a, b in itertools.pairwise(truth)) > 0.2
 
 
-def test_carrying_raises_the_wheel_drop_and_setting_down_clears_it(story: list[Moment]) -> None:
-    signals = [e for m in story for e in m.events if isinstance(e, Signal)]
+def test_carrying_raises_the_wheel_drop_and_setting_down_clears_it(moments: list[Moment]) -> None:
+    signals = [e for m in moments for e in m.events if isinstance(e, Signal)]
     drops = [s for s in signals if s.kind is SignalKind.WHEEL_DROP]
     assert [s.active for s in drops] == [True, False]
-    assert drops[0].stamp == next(m.stamp for m in story if m.phase == "carry")
+    assert drops[0].stamp == next(m.stamp for m in moments if m.phase == "carry")
     assert drops[1].stamp == pytest.approx(drops[0].stamp + 1.0)
-    assert story[-1].T_map_base == SE2(1.0, 1.0, 0.0)
+    assert moments[-1].T_map_base == SE2(1.0, 1.0, 0.0)
 
 
-def test_a_scan_says_where_the_sensor_sits(story: list[Moment]) -> None:
-    scan = next(e for e in story[0].events if isinstance(e, LaserScan))
+def test_a_scan_has_the_pose_of_the_sensor(moments: list[Moment]) -> None:
+    scan = next(e for e in moments[0].events if isinstance(e, LaserScan))
     assert scan.T_base_laser == SE2(0.07, 0.0, 0.0)
     assert len(scan) == 360
     assert math.isclose(scan.angle_increment, math.radians(1.0))
@@ -127,7 +125,7 @@ def test_a_scan_says_where_the_sensor_sits(story: list[Moment]) -> None:
     ],
 )
 def test_a_robot_is_not_put_into_a_wall(flat: OccupancyGrid, script: Scenario) -> None:
-    with pytest.raises(InputError, match="around it for the robot"):
+    with pytest.raises(InputError, match="too close to a wall"):
         next(run(script, flat, seed=1))
 
 

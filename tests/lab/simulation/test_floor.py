@@ -33,7 +33,7 @@ def test_room_ends_at_posts_and_at_the_border_wherever_the_map_lies(T_map_grid: 
     assert room_at(1.5, 3.01) == 0.0
 
 
-def test_what_nobody_has_seen_is_no_room_but_stops_no_ray() -> None:
+def test_unknown_cells_are_no_room_but_stops_no_ray() -> None:
     cells = np.zeros((9, 9), np.int8)
     cells[:, 5:] = -1
     floor = Floor(OccupancyGrid(cells, 0.1))

@@ -29,7 +29,7 @@ def places(crowd: People) -> np.ndarray:
     return crowd.circles[:, :2]
 
 
-def test_nobody_is_there_until_they_come_and_after_they_were_sent_away(hall: Floor) -> None:
+def test_a_floor_is_empty_before_people_come_and_after_they_leave(hall: Floor) -> None:
     crowd, pose = people(hall), SE2(3.0, 4.5, 0.0)
     assert crowd.circles.shape == (0, 3)
     crowd.come(5, Manner.WALK, pose)
@@ -50,7 +50,7 @@ def test_they_stay_out_of_walls_and_off_the_robot(hall: Floor, manner: Manner) -
             assert np.hypot(x - pose.x, y - pose.y) >= radius + 0.3
 
 
-def test_those_who_walk_get_about_and_at_a_human_pace(hall: Floor) -> None:
+def test_walking_people_move_at_a_human_pace(hall: Floor) -> None:
     crowd, pose = people(hall), SE2(3.0, 4.5, 0.0)
     crowd.come(6, Manner.WALK, pose)
     ways = np.zeros(6)
@@ -63,7 +63,7 @@ def test_those_who_walk_get_about_and_at_a_human_pace(hall: Floor) -> None:
     assert (ways > 6.0).all()
 
 
-def test_those_who_surround_the_robot_go_with_it(hall: Floor) -> None:
+def test_surrounding_people_move_with_the_robot(hall: Floor) -> None:
     crowd, pose = people(hall), SE2(2.0, 3.0, 0.0)
     crowd.come(5, Manner.SURROUND, pose)
     for _ in range(100):

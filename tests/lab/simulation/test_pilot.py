@@ -53,7 +53,7 @@ def test_a_path_that_comes_back_is_driven_to_its_end() -> None:
     assert len(drive(there_and_back, SE2(0.0, 0.0, 0.0))) * 0.02 * CRUISE_MPS > 4.0
 
 
-def test_who_is_at_the_goal_has_arrived() -> None:
+def test_a_robot_at_the_goal_has_arrived() -> None:
     pilot = Pilot(np.array([[1.0, 1.0], [1.0, 1.0]]))
     assert pilot.command(SE2(1.0, 1.0, 0.3)) == (0.0, 0.0)
     assert pilot.arrived

@@ -16,9 +16,9 @@ def test_a_log_has_odometry_and_truth_at_every_scan(hall_plan: OccupancyGrid) ->
         [DriveTo(SE2(7.5, 5.0, 0.0)), Pause(0.5), Teleport(SE2(1.5, 1.5, 0.0)), Stand(0.3)],
         start=SE2(3.0, 1.5, 0.3),
     )
-    story = list(run(script, hall_plan, seed=4))
-    log = record(iter(story))
-    assert len(log) == sum(moment.scan is not None for moment in story)
+    moments = list(run(script, hall_plan, seed=4))
+    log = record(iter(moments))
+    assert len(log) == sum(moment.scan is not None for moment in moments)
     assert log.odometry is not None
     assert log.truth is not None
     assert all(log.odometry.at(scan.stamp) is not None for scan in log.scans)

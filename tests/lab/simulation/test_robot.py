@@ -85,7 +85,7 @@ def test_a_wall_stops_it_and_presses_its_bumper_until_it_leaves() -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.tuples(st.floats(-0.5, 0.5), st.floats(-1.9, 1.9)), min_size=1, max_size=12))
-def test_whatever_it_is_told_it_never_stands_in_a_wall(
+def test_no_command_drives_the_robot_into_a_wall(
     commands: list[tuple[float, float]],
 ) -> None:
     moved = robot(kobuki=Kobuki())

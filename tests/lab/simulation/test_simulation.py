@@ -25,28 +25,28 @@ def turning(T_map_base: SE2) -> tuple[float, float]:
 
 
 def test_odometry_and_signals_come_before_the_scan_of_their_stamp(hall_plan: OccupancyGrid) -> None:
-    played = simulation(hall_plan)
-    played.step("first", turning)
-    played.robot.lift()
-    kinds = [type(event) for event in played.step("second").events]
+    moments_of = simulation(hall_plan)
+    moments_of.step("first", turning)
+    moments_of.robot.lift()
+    kinds = [type(event) for event in moments_of.step("second").events]
     assert kinds == [Signal, Signal, Odometry, LaserScan, Odometry, Odometry, Odometry, Odometry]
 
 
 def test_truth_is_that_of_the_scan(hall_plan: OccupancyGrid) -> None:
-    played = simulation(hall_plan)
+    moments_of = simulation(hall_plan)
     for expected in (0.0, 0.1, 0.2):
-        T_map_base = played.robot.T_map_base
-        moment = played.step("drive", turning)
+        T_map_base = moments_of.robot.T_map_base
+        moment = moments_of.step("drive", turning)
         assert moment.T_map_base == T_map_base
         assert moment.scan is not None
         assert moment.scan.stamp == moment.stamp == pytest.approx(expected)
-    assert played.robot.T_map_base.distance_to(START) > 0.0
+    assert moments_of.robot.T_map_base.distance_to(START) > 0.0
 
 
-def test_a_disturbance_is_told_once(hall_plan: OccupancyGrid) -> None:
-    played = simulation(hall_plan)
-    played.disturbed(Disturbance.PUSHED)
-    told = [played.step("stand").disturbance for _ in range(2)]
+def test_a_disturbance_is_reported_once(hall_plan: OccupancyGrid) -> None:
+    moments_of = simulation(hall_plan)
+    moments_of.disturbed(Disturbance.PUSHED)
+    told = [moments_of.step("stand").disturbance for _ in range(2)]
     assert told == [Disturbance.PUSHED, None]
 
 
@@ -54,16 +54,16 @@ def test_a_disturbance_is_told_once(hall_plan: OccupancyGrid) -> None:
 def test_only_motion_skews_a_scan(hall_plan: OccupancyGrid, command: object) -> None:
     scans = []
     for shutter in Shutter:
-        played = simulation(hall_plan, shutter)
+        moments_of = simulation(hall_plan, shutter)
         for _ in range(5):
-            moment = played.step("x", command) if command else played.step("x")  # type: ignore[arg-type]
+            moment = moments_of.step("x", command) if command else moments_of.step("x")  # type: ignore[arg-type]
         assert moment.scan is not None
         scans.append(moment.scan.ranges)
     assert (scans[0] == scans[1]).all() == (command is None)
 
 
 def test_what_goes_with_the_robot_is_seen_beside_it(hall_plan: OccupancyGrid) -> None:
-    played = simulation(hall_plan)
-    scan = played.step("carry", hands=np.array([[0.5, 0.0, 0.1]])).scan
+    moments_of = simulation(hall_plan)
+    scan = moments_of.step("carry", hands=np.array([[0.5, 0.0, 0.1]])).scan
     assert scan is not None
     assert scan.ranges[180] == pytest.approx(0.4, abs=1e-5)

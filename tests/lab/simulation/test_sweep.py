@@ -95,7 +95,7 @@ def test_people_block_beams_at_the_range_of_their_skin(turned_by: float) -> None
     np.testing.assert_array_equal(scan.ranges[~blocked], alone.ranges[~blocked])
 
 
-def test_who_stands_behind_a_wall_is_not_seen() -> None:
+def test_a_person_behind_a_wall_is_not_seen() -> None:
     pose = SE2(4.0, 3.2, 0.0)
     hidden = np.array([[9.0, 3.2, 0.2], [4.0, 10.5, 0.2]])
     np.testing.assert_array_equal(
