@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 import firstfix
-from firstfix.localizer.states import TABLE
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -70,22 +69,6 @@ def test_nothing_is_loaded_from_other_sites(site: Path) -> None:
 def test_the_reference_names_every_public_name() -> None:
     page = (DOCS / "reference" / "python.md").read_text(encoding="utf-8")
     assert set(re.findall(r"^::: firstfix\.(\w+)$", page, re.MULTILINE)) == set(firstfix.__all__)
-
-
-def test_states_in_the_table_are_those_of_the_localizer() -> None:
-    page = (DOCS / "states.md").read_text(encoding="utf-8")
-    rows = [line.strip("|").split("|") for line in page.splitlines() if line.startswith("|")]
-    targets = [cell.strip().removeprefix("to ") for cell in rows[0]]
-    told = {
-        (row[0].strip(), target, event.strip())
-        for row in rows[2:]
-        for target, cell in zip(targets[1:], row[1:], strict=True)
-        for event in cell.split(",")
-        if event.strip()
-    }
-    assert told == {
-        (state.value, after.value, event.value) for (state, event), after in TABLE.items()
-    }
 
 
 def test_the_changelog_has_the_version() -> None:
