@@ -27,7 +27,7 @@ def chromium() -> Iterator[Any]:
 
 @pytest.fixture
 def visit(chromium: Any) -> Iterator[Callable[..., page_lab.Visit]]:
-    """Give a function that opens a page; afterwards nothing may have gone wrong on any."""
+    """Give a function that opens a page; none of them may have logged an error."""
     contexts, visits = [], []
 
     def open_page(
@@ -45,7 +45,7 @@ def visit(chromium: Any) -> Iterator[Callable[..., page_lab.Visit]]:
 
 @pytest.fixture(scope="module")
 def office_server(chromium: Any) -> Iterator[page_lab.Server]:
-    """Give a robot in an office, where every place is found at once."""
+    """Give a robot in an office, where one scan is enough."""
     server = page_lab.Server("office", "--seed", "1").start()
     yield server
     server.stop()
@@ -53,7 +53,7 @@ def office_server(chromium: Any) -> Iterator[page_lab.Server]:
 
 @pytest.fixture(scope="module")
 def rooms_server(chromium: Any) -> Iterator[page_lab.Server]:
-    """Give a robot in one of four rooms that look the same."""
+    """Give a robot in one of four identical rooms."""
     server = page_lab.Server("rooms", "--seed", "1").start()
     yield server
     server.stop()
@@ -61,5 +61,5 @@ def rooms_server(chromium: Any) -> Iterator[page_lab.Server]:
 
 @pytest.fixture
 def recorder(ros2: Any) -> Recorder:
-    """Give a transport that keeps what is published, with messages of ROS 2."""
+    """Give a transport that records what is published, with messages of ROS 2."""
     return Recorder(ros2)

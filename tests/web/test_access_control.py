@@ -1,4 +1,4 @@
-"""Strangers are refused, and what goes out is hardened."""
+"""Access control: host, origin, token, and security headers of every response."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def locked():
 
 
 def raw(site: Site, method: str, path: str, headers: dict[str, str]) -> tuple[int, dict, bytes]:
-    """Ask for a path as it is written; clients of more manners would tidy it up."""
+    """Request a path as it is written; HTTP libraries would normalize it."""
     address = urlsplit(site.url)
     connection = http.client.HTTPConnection(address.hostname, address.port, timeout=30)
     connection.putrequest(method, path, skip_host="Host" in headers)
@@ -57,7 +57,7 @@ def refused(answer: httpx.Response, status: int) -> dict:
 
 
 @pytest.mark.parametrize("path", ["", "v1/status", "nothing", "static/nothing", "openapi.json"])
-def test_every_answer_is_hardened(site: Site, path: str):
+def test_every_response_has_security_headers(site: Site, path: str):
     answer = httpx.get(site.url + path)
     for name, value in HARDENING.items():
         assert answer.headers[name] == value
@@ -68,7 +68,7 @@ def test_every_answer_is_hardened(site: Site, path: str):
 @pytest.mark.parametrize(
     "host", ["localhost", "localhost:1", "127.0.0.1:80", "[::1]:9", "127.1.2.3"]
 )
-def test_names_of_this_machine_are_answered(site: Site, host: str):
+def test_requests_to_names_of_this_machine_are_answered(site: Site, host: str):
     assert raw(site, "GET", "/v1/status", {"Host": host})[0] == 200
 
 
@@ -76,14 +76,14 @@ def test_names_of_this_machine_are_answered(site: Site, host: str):
     "host",
     ["evil.example", "localhost.evil.example", "10.0.0.1", "", "[::1", "a@127.0.0.1.b", "x:y"],
 )
-def test_other_names_are_not(site: Site, host: str):
+def test_requests_to_other_names_are_refused(site: Site, host: str):
     status, headers, body = raw(site, "GET", "/v1/status", {"Host": host})
     assert status == 421
     assert b"127.0.0.1" in body
     assert headers["content-type"] == "application/problem+json"
 
 
-def test_other_names_are_answered_where_others_may_come_and_know_the_token():
+def test_requests_to_other_names_need_the_token_on_a_public_address():
     with fed(AccessPolicy(TOKEN, loopback_only=False)) as site:
         host = {"Host": "robot.example"}
         assert raw(site, "GET", "/v1/status", host)[0] == 401
@@ -93,14 +93,14 @@ def test_other_names_are_answered_where_others_may_come_and_know_the_token():
 @pytest.mark.parametrize(
     "origin", ["http://evil.example", "null", "http://localhost:1", "http://["]
 )
-def test_pages_of_others_may_neither_post_nor_watch(site: Site, origin: str):
+def test_other_web_sites_can_neither_post_nor_watch(site: Site, origin: str):
     refused(httpx.post(site.url + "v1/relocalize", headers={"origin": origin}), 403)
     with pytest.raises(InvalidStatus) as refusal:
         connect(site.live, additional_headers={"Origin": origin}).__enter__()
     assert refusal.value.response.status_code == 403
 
 
-def test_the_own_page_and_programs_may(site: Site):
+def test_the_own_page_and_programs_can(site: Site):
     own = site.url[:-1]
     # There is no map yet; but that is known only to who may ask.
     assert httpx.post(site.url + "v1/relocalize", headers={"origin": own}).status_code == 503
@@ -109,7 +109,7 @@ def test_the_own_page_and_programs_may(site: Site):
         assert viewer.recv(30)
 
 
-def test_a_token_opens_everything_but_the_page_which_is_open(locked: Site):
+def test_everything_but_the_page_needs_the_token(locked: Site):
     for path in ("v1/status", "v1/map.png", "openapi.json", "v1/nothing", "anything"):
         answer = httpx.get(locked.url + path)
         assert refused(answer, 401)["detail"] == "A token is needed."
@@ -130,13 +130,13 @@ def test_a_token_opens_everything_but_the_page_which_is_open(locked: Site):
         "Bearer \xe9",
     ],
 )
-def test_another_token_does_not(locked: Site, header: str):
+def test_a_wrong_token_is_refused(locked: Site, header: str):
     headers = {"authorization": header.encode("latin-1")}
     refused(httpx.get(locked.url + "v1/status", headers=headers), 401)
     refused(httpx.get(f"{locked.url}v1/status?token={TOKEN}"), 401)
 
 
-def test_who_guesses_is_kept_waiting():
+def test_guesses_are_rate_limited():
     with fed(AccessPolicy(TOKEN)) as site, httpx.Client() as client:
         answers = [client.get(site.url + "v1/status").status_code for _ in range(30)]
         assert answers[0] == 401
@@ -164,7 +164,7 @@ def test_who_guesses_is_kept_waiting():
         "/v1/../v1/status/",
     ],
 )
-def test_nothing_outside_is_reached(site: Site, path: str):
+def test_files_outside_of_static_are_not_served(site: Site, path: str):
     status, headers, body = raw(site, "GET", path, {})
     assert status in {400, 404, 307}
     assert b"root:" not in body
@@ -199,7 +199,7 @@ def test_the_url_of_all_addresses_names_the_machine():
     assert url_of(Everywhere()) == f"http://{socket.gethostname()}:8642/"
 
 
-def test_a_right_token_is_known_whatever_its_letters():
+def test_a_token_may_have_any_characters():
     assert AccessPolicy("naïve-☃-token").accepts("naïve-☃-token")
     assert not AccessPolicy("naïve-☃-token").accepts("naive-☃-token")
     assert not AccessPolicy("token").accepts("token\udcff")

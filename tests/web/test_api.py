@@ -1,4 +1,4 @@
-"""The HTTP API over real connections: what it says, and how it refuses."""
+"""The HTTP API over real connections: answers and refusals."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_the_page_and_its_files(api):
     assert again.status_code in {200, 304}
 
 
-def test_where_the_robot_is(api, site):
+def test_the_status_is_that_of_the_snapshot(api, site):
     status = api.get("/v1/status").json()
     view = site.store.snapshot
     assert (status["type"], status["state"], status["stamp"]) == ("state", "LOCALIZED", view.stamp)
@@ -69,11 +69,11 @@ def test_the_map(api, site):
 
 
 def test_the_picture_of_the_map(api, site):
-    told = api.get("/v1/map").json()["image"]
-    answer = api.get(told["url"])
+    announced = api.get("/v1/map").json()["image"]
+    answer = api.get(announced["url"])
     assert answer.headers["content-type"] == "image/png"
-    assert Image.open(io.BytesIO(answer.content)).size == (told["width"], told["height"])
-    again = api.get(told["url"], headers={"if-none-match": answer.headers["etag"]})
+    assert Image.open(io.BytesIO(answer.content)).size == (announced["width"], announced["height"])
+    again = api.get(announced["url"], headers={"if-none-match": answer.headers["etag"]})
     assert (again.status_code, again.content) == (304, b"")
     small = api.get("/v1/map.png?max=100", headers={"if-none-match": answer.headers["etag"]})
     assert small.status_code == 200
@@ -81,15 +81,15 @@ def test_the_picture_of_the_map(api, site):
 
 
 @pytest.mark.parametrize("most", ["0", "63", "-5", "1e3", "x", "", "９９", "123456", "nan"])
-def test_a_size_that_is_none(api, most):
+def test_a_wrong_image_size_is_refused(api, most):
     assert "max" in detail(api.get("/v1/map.png", params={"max": most}), 422)
 
 
-def test_more_than_the_most_is_the_most(api):
+def test_a_larger_image_size_is_limited(api):
     assert api.get("/v1/map.png?max=99999").content == api.get("/v1/map.png").content
 
 
-def test_a_person_says_where(api, site):
+def test_a_pose_becomes_a_hint(api, site):
     answer = api.post("/v1/pose", json={"x": 1, "y": 2.5, "yaw": -1})
     assert answer.status_code == 202
     (hint,) = site.given
@@ -121,7 +121,7 @@ def test_relocalize(api, site):
         (b" " * 20_000, 413),
     ],
 )
-def test_a_pose_that_is_none(api, site, body, status):
+def test_a_malformed_pose_is_refused(api, site, body, status):
     assert detail(api.post("/v1/pose", content=body, headers=JSON), status)
     assert site.given == []
 
@@ -129,7 +129,7 @@ def test_a_pose_that_is_none(api, site, body, status):
 @pytest.mark.parametrize(
     "kind", ["", "text/plain", "application/x-www-form-urlencoded", "multipart/form-data", "json"]
 )
-def test_bodies_of_other_kinds(api, kind):
+def test_other_media_types_are_refused(api, kind):
     # A form of another site could send these without being asked whether it may.
     content = b'{"x": 1, "y": 2, "yaw": 3}'
     answer = api.post("/v1/pose", content=content, headers={"content-type": kind})
@@ -137,28 +137,28 @@ def test_bodies_of_other_kinds(api, kind):
     assert answer.headers["accept"] == "application/json"
 
 
-def test_packed_bodies(api):
+def test_compressed_bodies_are_refused(api):
     bomb = gzip.compress(b" " * 10_000_000)
     answer = api.post("/v1/locate", content=bomb, headers={**JSON, "content-encoding": "gzip"})
     assert "uncompressed" in detail(answer, 415)
 
 
-def said_to(site: Site, request: bytes) -> bytes:
-    """Send the beginning of a request, and hear what is answered to that."""
+def response_to(site: Site, request: bytes) -> bytes:
+    """Send the beginning of a request, and return the response to it."""
     address = urlsplit(site.url)
     with socket.create_connection((address.hostname, address.port), 30) as client:
         client.sendall(b"POST /v1/pose HTTP/1.1\r\nHost: localhost\r\n" + request)
         return client.recv(1000)
 
 
-def test_bodies_that_are_told_to_be_too_long(site):
-    told = b"Content-Type: application/json\r\nContent-Length: %d\r\n\r\n"
-    assert b"413" in said_to(site, told % (MOST_BYTES + 1))
-    assert b"413" in said_to(site, told % 10**19)
-    assert b"400" in said_to(site, b"Content-Length: -5\r\n\r\n")
+def test_bodies_announced_as_too_long_are_refused(site):
+    announced = b"Content-Type: application/json\r\nContent-Length: %d\r\n\r\n"
+    assert b"413" in response_to(site, announced % (MOST_BYTES + 1))
+    assert b"413" in response_to(site, announced % 10**19)
+    assert b"400" in response_to(site, b"Content-Length: -5\r\n\r\n")
 
 
-def test_bodies_that_turn_out_to_be_too_long(site):
+def test_bodies_that_become_too_long_are_refused(site):
     def endless() -> Iterator[bytes]:
         for _ in range(2 * MOST_BYTES // 65536):
             yield b" " * 65536
@@ -166,17 +166,17 @@ def test_bodies_that_turn_out_to_be_too_long(site):
     try:
         answer = httpx.post(site.url + "v1/locate", content=endless(), headers=JSON, timeout=60.0)
     except (httpx.WriteError, httpx.ReadError):
-        return  # it hung up while we were still talking, which is its good right
+        return  # the server closed the connection before the body was sent
     assert detail(answer, 413)
 
 
-def test_bodies_that_take_too_long(site, monkeypatch):
+def test_slow_bodies_are_refused(site, monkeypatch):
     monkeypatch.setattr("firstfix.web.request_body.TIMEOUT_S", 0.2)
     kind = b"Content-Type: application/json\r\nContent-Length: 30\r\n\r\n"
-    assert b"408" in said_to(site, kind + b'{"x": ')
+    assert b"408" in response_to(site, kind + b'{"x": ')
 
 
-def test_bodies_that_break_off(site):
+def test_incomplete_bodies_do_no_harm(site):
     address = urlsplit(site.url)
     with socket.create_connection((address.hostname, address.port), 30) as broken:
         broken.sendall(
@@ -197,14 +197,14 @@ def test_bodies_that_break_off(site):
         ("PUT", "/", "GET, HEAD"),
     ],
 )
-def test_other_methods(api, method, path, allowed):
+def test_other_methods_are_refused(api, method, path, allowed):
     answer = api.request(method, path)
     detail(answer, 405)
     assert sorted(answer.headers["allow"].split(", ")) == allowed.split(", ")
 
 
 @pytest.mark.parametrize("path", ["/", "/v1/status", "/v1/map", "/v1/map.png", "/openapi.json"])
-def test_heads_are_those_of_the_answers(api, path):
+def test_head_has_the_headers_of_get(api, path):
     head, answer = api.head(path), api.get(path)
     assert (head.status_code, head.content) == (200, b"")
     for name in ("content-type", "content-length"):
@@ -212,11 +212,11 @@ def test_heads_are_those_of_the_answers(api, path):
 
 
 @pytest.mark.parametrize("path", ["/v1", "/v1/", "/v2/status", "/favicon.ico", "/docs", "/v1/live"])
-def test_what_is_not_there(api, path):
+def test_unknown_paths_are_not_found(api, path):
     assert detail(api.get(path), 404)
 
 
-def test_before_there_is_a_map():
+def test_requests_before_the_first_map_get_503():
     with fed() as site, httpx.Client(base_url=site.url) as api:
         assert api.get("/v1/status").json()["state"] == "NO_MAP"
         for method, path in (
@@ -230,7 +230,7 @@ def test_before_there_is_a_map():
             assert answer.headers["retry-after"]
 
 
-def test_who_may_only_watch(site):
+def test_a_read_only_server_refuses_commands(site):
     with fed(AccessPolicy(may_steer=False), site.store) as watched:
         with httpx.Client(base_url=watched.url) as api:
             pose = {"x": 1, "y": 2, "yaw": 3}
@@ -240,7 +240,7 @@ def test_who_may_only_watch(site):
         assert watched.given == []
 
 
-def test_an_error_of_ours_tells_nothing_to_clients(site, monkeypatch, caplog):
+def test_an_internal_error_discloses_nothing(site, monkeypatch, caplog):
     def broken(*_: object) -> None:
         raise RuntimeError("the password is hunter2")
 

@@ -1,4 +1,4 @@
-"""The page of a robot on a network is served in a thread beside its node."""
+"""The page of a real robot is served in a background thread."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def state(api: httpx.Client) -> str:
     return api.get("/v1/status").json()["state"]
 
 
-def test_a_node_is_seen_and_steered(ways, recorder: Recorder):
+def test_a_node_is_shown_and_controlled(ways, recorder: Recorder):
     page, api = ways
     assert state(api) == "NO_MAP"
     node = page.make_node(NodeConfig(mode=Mode.FULL), recorder)
@@ -58,7 +58,7 @@ def test_a_node_is_seen_and_steered(ways, recorder: Recorder):
     node.stop()
 
 
-def test_before_it_is_configured_there_is_nobody_to_tell(ways):
+def test_commands_before_the_node_is_configured_are_refused(ways):
     page, _ = ways
     with pytest.raises(InputError, match="configure"):
         page._give(NewMap(0.0, HOUSE))

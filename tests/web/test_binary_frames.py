@@ -1,4 +1,4 @@
-"""Binary messages say the same as what they are made of."""
+"""Binary messages have the content of the snapshot."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def opened(frame: bytes, columns: int) -> tuple[tuple, np.ndarray, bytes]:
     return (kind, version, zero, n, stamp), values, frame[16 + 4 * columns * n :]
 
 
-def test_a_scan_lies_where_it_was_taken(view):
+def test_a_scan_is_drawn_at_its_pose(view):
     header, points, classes = opened(scan_frame(view.scan, view.map), 2)
     scan = view.scan.scan
     hit = usable_beams(scan).thinned(BEAMS).hit
@@ -50,7 +50,7 @@ def test_a_scan_lies_where_it_was_taken(view):
     assert (kinds[hit] == 0).mean() > 0.9
 
 
-def test_beams_without_a_return_end_where_sight_ends(view):
+def test_beams_without_a_return_end_at_the_maximum_range(view):
     _, points, classes = opened(scan_frame(view.scan, view.map), 2)
     scan = view.scan.scan
     laser = view.scan.T_map_base @ scan.T_base_laser
@@ -60,12 +60,12 @@ def test_beams_without_a_return_end_where_sight_ends(view):
     np.testing.assert_allclose(reach, scan.range_max, atol=1e-3)
 
 
-def test_nothing_is_a_header_alone():
+def test_an_empty_frame_is_a_header_alone():
     assert scan_frame(None, None) == struct.pack("<BBHId", 1, 1, 0, 0, 0.0)
     assert particles_frame(None, None, 3.5) == struct.pack("<BBHId", 2, 1, 0, 0, 3.5)
 
 
-def test_particles_go_with_the_robot():
+def test_particles_move_with_the_robot():
     poses = np.array([[1.0, 2.0, 0.0], [1.0, 2.0, np.pi / 2]])
     belief = ParticleCloud(equal_weights(poses), SE2(1.0, 2.0, 0.0))
     header, values, rest = opened(particles_frame(belief, SE2(1.0, 2.0, 0.0), 7.0), 3)

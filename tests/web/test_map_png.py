@@ -44,7 +44,7 @@ def test_a_thin_wall_stays_in_a_small_picture():
 
 
 @pytest.mark.parametrize("side", [64, 100, 101, 127, 600])
-def test_it_is_as_large_as_it_is_said_to_be(side):
+def test_the_image_has_the_size_of_its_layout(side):
     of = shown(np.full((333, 600), FREE))
     width, height, resolution = png_layout(of, side)
     assert picture(of, side).shape == (height, width)

@@ -1,4 +1,4 @@
-"""The document of the API is valid, and the server does what it says."""
+"""The OpenAPI document is valid, and the server conforms to it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ REFS = "#/components/schemas/"
 
 
 def references(node: object) -> set[str]:
-    """Return all that a document refers to."""
+    """Return all references of a document."""
     if isinstance(node, dict):
         own = {node["$ref"]} if "$ref" in node else set()
         return own.union(*(references(value) for value in node.values()))
@@ -26,7 +26,7 @@ def references(node: object) -> set[str]:
     return set()
 
 
-def test_what_is_referred_to_is_there_and_the_other_way_round():
+def test_every_reference_is_defined_and_every_schema_is_used():
     described = document()
     schemas = {REFS + name for name in described["components"]["schemas"]}
     assert references(described) == schemas
@@ -57,7 +57,7 @@ def test_every_refusal_is_a_problem():
 @pytest.mark.skipif(
     importlib.util.find_spec("schemathesis") is None, reason="schemathesis is not installed"
 )
-def test_a_stranger_who_has_only_read_the_document_finds_no_fault():
+def test_schemathesis_finds_no_deviation_from_the_document():
     begun = drive("house")
     begun.step(25)
     arguments = (

@@ -1,4 +1,4 @@
-"""The page in a real browser: it loads from the robot alone, and shows what is true."""
+"""The page in a real browser: it loads from the robot alone and shows its state."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ FIRST_PAINT = """() => [
 
 
 @DEVICES
-def test_nothing_sticks_out_of_the_window(
+def test_nothing_is_wider_than_the_window(
     visit: Visitor, office_server: Server, device: dict
 ) -> None:
     page = visit(office_server.url, device)
@@ -73,7 +73,7 @@ def test_nothing_sticks_out_of_the_window(
     assert page.page.evaluate("document.scrollingElement.scrollWidth <= innerWidth")
 
 
-def test_fingers_hit_everything(visit: Visitor, office_server: Server) -> None:
+def test_controls_are_large_enough_for_fingers(visit: Visitor, office_server: Server) -> None:
     page = visit(office_server.url, PHONE)
     page.wait_for_map()
     page.page.tap("#sheet-handle")
@@ -87,7 +87,7 @@ def test_fingers_hit_everything(visit: Visitor, office_server: Server) -> None:
 
 @pytest.fixture
 def turned(chromium: Any, request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Turned]:
-    """Give a robot on a map whose origin is turned, and which has so many free columns besides."""
+    """Give a robot on a map with a turned origin and additional free columns."""
     yaw, columns = request.param
     plan = WORLDS["house"]().cells
     cells = np.pad(plan, ((0, 0), (columns, 0)))
@@ -135,7 +135,7 @@ def test_a_scene_is_drawn_only_when_it_changes(visit: Visitor, office_server: Se
     assert page.page.evaluate(count) > 5
 
 
-def test_the_theme_is_as_the_system_says_until_somebody_chooses(
+def test_the_theme_follows_the_system_until_the_button_is_pressed(
     visit: Visitor, office_server: Server
 ) -> None:
     page = visit(office_server.url, color_scheme="dark")

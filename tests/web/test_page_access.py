@@ -1,4 +1,4 @@
-"""Who may see the page, who may steer, and what happens when the robot goes away."""
+"""Token, read-only server, and a lost connection."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TOKEN = "fern-otter-91"  # noqa: S105 - of a test
 
 @pytest.fixture(scope="module")
 def guarded(chromium: Any) -> Iterator[Server]:
-    """Give a robot that asks for a token."""
+    """Give a server with a token."""
     server = Server("office", "--token", TOKEN).start()
     yield server
     server.stop()
@@ -24,13 +24,13 @@ def guarded(chromium: Any) -> Iterator[Server]:
 
 @pytest.fixture(scope="module")
 def watched(chromium: Any) -> Iterator[Server]:
-    """Give a robot that may be watched only."""
+    """Give a read-only server."""
     server = Server("office", "--read-only").start()
     yield server
     server.stop()
 
 
-def test_a_restarted_robot_is_found_again(visit: Visitor, chromium: Any) -> None:
+def test_the_page_reconnects_to_a_restarted_server(visit: Visitor, chromium: Any) -> None:
     server = Server("office").start()
     page = visit(server.url)
     page.wait_for_fix()
@@ -47,20 +47,20 @@ def test_a_restarted_robot_is_found_again(visit: Visitor, chromium: Any) -> None
     finally:
         server.stop()
     page.page.wait_for_selector("#connection-lost", state="visible")
-    # That nobody answered is what this was about.
+    # The test stopped the server on purpose.
     page.problems = [problem for problem in page.problems if "net::ERR_CONNECTION" not in problem]
 
 
-def test_a_link_may_have_the_token(visit: Visitor, guarded: Server) -> None:
+def test_the_token_can_be_in_the_link(visit: Visitor, guarded: Server) -> None:
     page = visit(f"{guarded.url}#token={TOKEN}")
     page.wait_for_fix()
-    assert page.page.url == guarded.url  # nobody reads it over a shoulder, or bookmarks it
+    assert page.page.url == guarded.url  # it is neither visible nor bookmarked
     page.page.reload()
     page.wait_for_fix()
     assert page.page.is_hidden("#token-dialog")
 
 
-def test_who_has_no_token_is_asked_for_it(visit: Visitor, guarded: Server) -> None:
+def test_a_visitor_without_a_token_is_asked_for_it(visit: Visitor, guarded: Server) -> None:
     page = visit(guarded.url)
     for token in ("not the token", TOKEN):
         page.page.wait_for_selector("#token-dialog[open]")
@@ -72,13 +72,13 @@ def test_who_has_no_token_is_asked_for_it(visit: Visitor, guarded: Server) -> No
     page.problems = [problem for problem in page.problems if "401" not in problem]
 
 
-def test_a_token_that_has_become_wrong_is_asked_for_anew(visit: Visitor, guarded: Server) -> None:
+def test_a_visitor_with_an_old_token_is_asked_again(visit: Visitor, guarded: Server) -> None:
     page = visit(f"{guarded.url}#token=of-yesterday")
     page.page.wait_for_selector("#token-dialog[open]")
     page.problems = [problem for problem in page.problems if "401" not in problem]
 
 
-def test_who_may_only_watch_sees_no_action(visit: Visitor, watched: Server) -> None:
+def test_a_read_only_page_has_no_commands(visit: Visitor, watched: Server) -> None:
     page = visit(watched.url)
     page.wait_for_fix()
     assert page.page.is_visible("#watching")
@@ -98,7 +98,7 @@ def test_who_may_only_watch_sees_no_action(visit: Visitor, watched: Server) -> N
     assert not [text for text in page.events() if "Relocalization requested" in text]
 
 
-def test_several_watch_at_once(visit: Visitor, watched: Server) -> None:
+def test_several_viewers_at_once(visit: Visitor, watched: Server) -> None:
     pages = [visit(watched.url) for _ in range(3)]
     for page in pages:
         page.wait_for_state("LOCALIZED")

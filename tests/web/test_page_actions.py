@@ -1,4 +1,4 @@
-"""What people do on the page arrives at the robot."""
+"""Commands on the page reach the robot."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ Visitor = Callable[..., Visit]
 
 @pytest.fixture
 def page(visit: Visitor, office_server: Server) -> Visit:
-    """Give the page of a robot that knows where it is."""
+    """Give the page of a localized robot."""
     visited = visit(office_server.url)
     visited.wait_for_fix()
     return visited
 
 
-def said_at(page: Visit) -> tuple[float, float]:
-    """Return where the newest hint says that the robot is."""
+def hinted_position(page: Visit) -> tuple[float, float]:
+    """Return the position of the newest hint."""
     match = page.wait_for_event(r"Hint from.* \((-?[\d.]+), (-?[\d.]+)\)")
     return float(match[1]), float(match[2])
 
 
 def stand_still(page: Visit) -> None:
-    """Hold the robot, and look at it from near by."""
+    """Pause the robot, and zoom in on it."""
     page.page.keyboard.press("l")
     page.page.keyboard.press(" ")
     page.page.wait_for_selector("#paused", state="visible")
@@ -55,7 +55,7 @@ def test_a_drag_sets_the_pose(page: Visit) -> None:
     page.page.click("#mode-pose")
     assert page.page.get_attribute("#mode-pose", "aria-pressed") == "true"
     page.press_and_pull(x, y, yaw)
-    assert math.dist(said_at(page), (x, y)) < 0.05
+    assert math.dist(hinted_position(page), (x, y)) < 0.05
     assert page.data("mode") == "look"
     page.page.keyboard.press(" ")
     page.wait_for_event("Localized at")
@@ -63,7 +63,7 @@ def test_a_drag_sets_the_pose(page: Visit) -> None:
     assert is_near_truth(page, 0.2, 0.2)
 
 
-def test_a_press_without_a_pull_says_nothing(page: Visit) -> None:
+def test_a_press_without_a_drag_sends_nothing(page: Visit) -> None:
     before = page.events()
     page.page.click("#mode-pose")
     page.click_on_map(20.0, 12.0)
@@ -87,7 +87,7 @@ def test_a_long_press_of_a_finger_sets_the_pose(visit: Visitor, office_server: S
     for reach in (20.0, 50.0):
         hand.touch("touchMove", [(px + reach * math.cos(yaw), py - reach * math.sin(yaw))])
     hand.touch("touchEnd", [])
-    assert math.dist(said_at(page), (x, y)) < 0.05
+    assert math.dist(hinted_position(page), (x, y)) < 0.05
     page.page.wait_for_timeout(700)  # sooner, the browser takes both for a double tap
     page.page.tap("#pause")
     page.wait_for_event("Localized at")
@@ -169,7 +169,7 @@ def test_picking_a_place_resolves_an_ambiguous_start(
     assert page.colour_of("#state h2") == page.colour_variable("chosen")
 
 
-def test_a_carried_robot_is_searched_and_found(page: Visit) -> None:
+def test_a_carried_robot_is_lifted_and_localized_again(page: Visit) -> None:
     x, y, yaw = 4.0, 19.5, -0.8
     page.page.click("#mode-carry")
     page.press_and_pull(x, y, yaw)
@@ -200,20 +200,20 @@ def test_a_goal_is_driven_to(page: Visit) -> None:
     assert page.data("mode") == "look"
 
 
-def test_what_cannot_be_done_is_said(page: Visit) -> None:
+def test_a_refused_command_is_explained(page: Visit) -> None:
     page.page.click("#mode-goal")
     page.click_on_map(35.0, 1.0)  # outside of the building
     page.page.wait_for_selector("#error-notice", state="visible")
     assert page.page.inner_text("#error-notice")
 
 
-def test_relocalize_forgets_and_searches(page: Visit) -> None:
+def test_relocalize_discards_the_pose(page: Visit) -> None:
     page.page.click("#relocalize")
     page.wait_for_event("Relocalization requested")
     page.wait_for_state("LOCALIZED")
 
 
-def test_pause_holds_the_robot(page: Visit, office_server: Server) -> None:
+def test_pause_stops_the_clock(page: Visit, office_server: Server) -> None:
     page.page.click("#pause")
     page.page.wait_for_selector("#paused", state="visible")
     assert page.page.inner_text("#pause-text") == "Resume"
@@ -225,7 +225,7 @@ def test_pause_holds_the_robot(page: Visit, office_server: Server) -> None:
 
 
 def held_stamp(page: Visit, server: Server) -> float | None:
-    """Return the time of the robot if its clock stands still."""
+    """Return the time of the robot if its clock is stopped."""
     before = server.status()["stamp"]
     page.page.wait_for_timeout(300)
     return before if server.status()["stamp"] == before else None
@@ -236,7 +236,7 @@ def test_people_come_and_go(page: Visit) -> None:
     slider.fill("12")
     assert page.page.inner_text("#people-count") == "12"
     short = page.page.locator("#legend .short b")
-    wait_until(lambda: short.inner_text() not in {"0%", "–"}, lambda: "somebody is seen")
+    wait_until(lambda: short.inner_text() not in {"0%", "–"}, lambda: "people are seen")
     page.page.click("#add-person")
     assert page.page.inner_text("#people-count") == "13"
     slider.fill("0")
@@ -244,7 +244,7 @@ def test_people_come_and_go(page: Visit) -> None:
 
 
 @pytest.mark.parametrize("device", [DESKTOP, PHONE], ids=["desktop", "phone"])
-def test_what_is_shown_can_be_chosen(visit: Visitor, office_server: Server, device: dict) -> None:
+def test_layers_can_be_hidden(visit: Visitor, office_server: Server, device: dict) -> None:
     page = visit(office_server.url, device)
     page.wait_for_fix()
     if device is PHONE:

@@ -1,4 +1,4 @@
-"""The page without a mouse, and for those who do not see it."""
+"""The page with a keyboard and with a screen reader."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Visitor = Callable[..., Visit]
 
 @pytest.fixture
 def page(visit: Visitor, office_server: Server) -> Visit:
-    """Give the page of a robot that knows where it is."""
+    """Give the page of a localized robot."""
     visited = visit(office_server.url)
     visited.wait_for_fix()
     return visited
@@ -66,7 +66,7 @@ def test_keys_set_the_pose(page: Visit) -> None:
     page.wait_for_state("LOCALIZED")
 
 
-def test_escape_leaves_a_mode_and_nothing_is_sent(page: Visit) -> None:
+def test_escape_leaves_a_mode_without_a_command(page: Visit) -> None:
     before = page.events()
     for key, mode in (("p", "pose"), ("g", "goal"), ("c", "carry")):
         page.page.keyboard.press(key)
@@ -78,7 +78,7 @@ def test_escape_leaves_a_mode_and_nothing_is_sent(page: Visit) -> None:
     assert page.events() == before
 
 
-def test_every_control_is_reached_by_tab_and_shows_it(page: Visit) -> None:
+def test_every_control_is_reached_by_tab_with_a_visible_focus(page: Visit) -> None:
     controls = page.page.locator("#app :is(button, input, canvas[tabindex]):visible").count()
     reached = set()
     for _ in range(controls + 6):
@@ -94,7 +94,7 @@ def test_every_control_is_reached_by_tab_and_shows_it(page: Visit) -> None:
         assert name in reached
 
 
-def test_a_button_with_the_focus_has_its_space_bar(page: Visit) -> None:
+def test_the_space_bar_presses_a_focused_button(page: Visit) -> None:
     page.page.focus("#theme")
     dark = page.page.evaluate("document.getElementById('dark').media")
     page.page.keyboard.press(" ")
@@ -102,7 +102,7 @@ def test_a_button_with_the_focus_has_its_space_bar(page: Visit) -> None:
     assert page.page.is_hidden("#paused")
 
 
-def test_what_happens_is_spoken(page: Visit) -> None:
+def test_changes_are_announced_to_screen_readers(page: Visit) -> None:
     spoken = page.page.locator("#spoken")
     assert spoken.get_attribute("aria-live") == "polite"
     wait_until(lambda: "localized" in spoken.inner_text().lower(), spoken.inner_text)
@@ -138,7 +138,7 @@ def test_the_help_lists_the_keys(page: Visit) -> None:
         pytest.param(PHONE, "dark", "office", id="phone-dark-office"),
     ],
 )
-def test_axe_finds_no_serious_fault(
+def test_axe_finds_no_serious_violation(
     visit: Visitor,
     request: pytest.FixtureRequest,
     device: dict[str, Any],
@@ -165,7 +165,7 @@ def test_axe_finds_no_serious_fault(
 
 
 def serious_faults(page: Visit) -> list[str]:
-    """Let axe-core look at the page."""
+    """Return the serious violations that axe-core finds."""
     from axe_playwright_python.sync_playwright import Axe
 
     violations = Axe().run(page.page).response["violations"]

@@ -1,4 +1,4 @@
-"""Who asks too much, or guesses, is kept waiting."""
+"""Clients are limited in rate, and wrong tokens cost more."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import time
 from firstfix.web.rate_limiter import RateLimiter
 
 
-def test_the_end_of_an_allowance():
+def test_a_client_is_limited_in_burst_and_rate():
     now = [0.0]
     limiter = RateLimiter(rate_hz=2.0, burst=3.0, clock=lambda: now[0])
     assert [limiter.admits("a") for _ in range(4)] == [True, True, True, False]
@@ -18,7 +18,7 @@ def test_the_end_of_an_allowance():
     assert [limiter.admits("a") for _ in range(4)] == [True, True, True, False]
 
 
-def test_what_was_charged_has_to_be_waited_for():
+def test_a_charge_delays_the_client():
     now = [0.0]
     limiter = RateLimiter(rate_hz=2.0, burst=3.0, clock=lambda: now[0])
     limiter.charge("a", 5.0)
@@ -28,7 +28,7 @@ def test_what_was_charged_has_to_be_waited_for():
     assert limiter.admits("a")
 
 
-def test_a_flood_of_clients_is_forgotten():
+def test_the_number_of_remembered_clients_is_bounded():
     limiter = RateLimiter(clock=time.monotonic)
     for i in range(5000):
         assert limiter.admits(f"{i}")

@@ -37,8 +37,8 @@ def url_in(log: Callable[[], str]) -> str:
     return found.group()
 
 
-def follow_a_story(url: str) -> None:
-    """It is found; told to forget it is found anew; nobody can send it anywhere."""
+def localize_three_times(url: str) -> None:
+    """Localize, then again after a hint and after a reset."""
     with httpx.Client(base_url=url, timeout=60.0) as api:
 
         def status() -> dict[str, Any]:
@@ -46,11 +46,11 @@ def follow_a_story(url: str) -> None:
 
         until(lambda: status()["state"] == "LOCALIZED", "the robot to be found", PATIENCE_S)
         assert api.get("/v1/map").json()["name"] == "office"
-        told = status()
-        assert told["truth"] is None
-        assert told["particles"] > 0
-        found_at = told["stamp"]
-        x, y, yaw = told["pose"]
+        first = status()
+        assert first["truth"] is None
+        assert first["particles"] > 0
+        found_at = first["stamp"]
+        x, y, yaw = first["pose"]
         assert api.post("/v1/pose", json={"x": x, "y": y, "yaw": yaw}).status_code == 202
         until(lambda: (s := status())["state"] == "LOCALIZED" and s["stamp"] > found_at)
         assert api.post("/v1/relocalize").status_code == 202
@@ -60,7 +60,7 @@ def follow_a_story(url: str) -> None:
 def test_a_robot_of_ros_1(ros1: Any, office: str):
     ros1.robot("stand")
     node = ros1.start(*command(office, "ros1", "_mode:=full"))
-    follow_a_story(url_in(lambda: node.said))
+    localize_three_times(url_in(lambda: node.said))
     node.end()
     assert node.wait() == 0
     assert "Traceback" not in node.said
@@ -69,6 +69,6 @@ def test_a_robot_of_ros_1(ros1: Any, office: str):
 def test_a_robot_of_dds(dds: Any, office: str):
     dds.robot("stand")
     node = dds._start(command(office, "dds", "-p", "mode:=full"), {})
-    follow_a_story(url_in(lambda: node.log))
+    localize_three_times(url_in(lambda: node.log))
     assert node.end() == 0
     assert "Traceback" not in node.log

@@ -1,4 +1,4 @@
-"""What viewers may see follows what the localizer says."""
+"""The snapshot follows the outputs of the localizer."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from firstfix.localizer.states import State
 from firstfix.web.snapshot import SimulationStatus
 from firstfix.web.timeline import MOST_EVENTS
 
-ASLEEP = 20  # silent scans at the start of a simulated robot
+ASLEEP = 20  # steps without a scan at the start of a simulated robot
 
 
 def kinds(store) -> list[str]:
@@ -24,13 +24,13 @@ def kinds(store) -> list[str]:
 
 @pytest.fixture(scope="module")
 def found():
-    """A robot that was found by its first scan."""
+    """A robot that was localized by its first scan."""
     found = drive()
     found.step(ASLEEP + 1)
     return found
 
 
-def test_there_is_nothing_before_the_first_map_and_no_pose_before_the_first_scan():
+def test_there_is_no_pose_before_the_first_scan():
     begun = drive()
     view = begun.store.snapshot
     assert (view.state, view.pose, view.scan, view.particles) == (State.SEARCHING, None, None, None)
@@ -39,7 +39,7 @@ def test_there_is_nothing_before_the_first_map_and_no_pose_before_the_first_scan
     assert kinds(begun.store) == ["map"]
 
 
-def test_a_robot_is_found_and_everything_fits_together(found):
+def test_a_snapshot_of_a_localized_robot_is_consistent(found):
     view = found.store.snapshot
     assert view.state is State.LOCALIZED
     assert view.pose.distance_to(view.truth) < 0.05
@@ -64,7 +64,7 @@ def test_numbers_of_events_go_up_and_only_the_last_are_kept(found):
     assert store.events(events[-1].number + 1) == []
 
 
-def test_a_lifted_robot_is_nowhere_and_its_time_counts_from_when_it_stands():
+def test_a_lifted_robot_has_no_pose_and_its_time_to_fix_begins_when_it_is_set_down():
     begun = drive()
     begun.step(ASLEEP + 5)
     (pose,) = random_free_poses(begun.store.snapshot.map.grid, np.random.default_rng(5), 1, 0.5)
@@ -79,7 +79,7 @@ def test_a_lifted_robot_is_nowhere_and_its_time_counts_from_when_it_stands():
     assert kinds(begun.store) == ["map", "found", "lifted", "lifted", "found"]
 
 
-def test_several_places_are_shown_with_the_scan_at_the_first():
+def test_several_places_are_listed_with_the_scan_at_the_first():
     begun = drive("rooms")
     begun.step(ASLEEP + 1)
     view = begun.store.snapshot
@@ -96,7 +96,7 @@ def test_several_places_are_shown_with_the_scan_at_the_first():
     assert kinds(begun.store) == ["map", "state", "hint", "found"]
 
 
-def test_a_reset_forgets_all_and_nothing_was_lost():
+def test_a_reset_discards_the_pose_and_is_no_loss():
     begun = drive()
     begun.step(ASLEEP + 1)
     begun.give(Reset(begun.store.snapshot.stamp))
@@ -105,7 +105,7 @@ def test_a_reset_forgets_all_and_nothing_was_lost():
     assert kinds(begun.store)[-1] == "state"
 
 
-def test_particles_remember_the_pose_that_was_taken_from_them():
+def test_particles_keep_the_pose_of_their_update():
     begun = drive()
     begun.step(ASLEEP + 1)
     beliefs = set()
@@ -117,7 +117,7 @@ def test_particles_remember_the_pose_that_was_taken_from_them():
     assert len(beliefs) > 1  # it drove, and they were used again
 
 
-def test_a_view_is_not_changed_by_what_comes_later(found):
+def test_a_snapshot_never_changes(found):
     view = found.store.snapshot
     pose, stamp = view.pose, view.stamp
     found.store.set_truth(SE2(1.0, 2.0, 3.0))
@@ -126,7 +126,7 @@ def test_a_view_is_not_changed_by_what_comes_later(found):
     assert found.store.snapshot.stamp > stamp
 
 
-def test_whoever_listens_is_called_until_they_hang_up(found):
+def test_subscribers_are_called_until_they_unsubscribe(found):
     calls = []
 
     def changed() -> None:

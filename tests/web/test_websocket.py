@@ -1,4 +1,4 @@
-"""One WebSocket for each viewer: all see the same, nobody waits for the slow."""
+"""One WebSocket per viewer: all receive the same, and a slow one delays no other."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from firstfix.web.timeline import MOST_EVENTS
 ASLEEP = 20
 PATIENCE_S = 30.0
 
-# A client that stops reading when it has enough does not hear that its good-bye was heard.
+# A client that stops reading when it has enough does not hear that its good-bye was received.
 connect = partial(connect_sync, max_queue=None, close_timeout=2.0)
 
 
@@ -67,7 +67,7 @@ def next_of(viewer: ClientConnection, kind: str) -> dict:
             return json.loads(message) if isinstance(message, str) else {"frame": message}
 
 
-def test_a_viewer_is_greeted_and_sees_all_that_there_is(site: Site):
+def test_a_viewer_first_receives_hello_and_every_kind_of_frame(site: Site):
     with connect(site.live) as viewer:
         first = [viewer.recv(PATIENCE_S) for _ in range(5)]
         kinds = ["hello", "state", "scan", "particles", "belief"]
@@ -79,7 +79,7 @@ def test_a_viewer_is_greeted_and_sees_all_that_there_is(site: Site):
         assert (state["state"], state["viewers"]) == ("LOCALIZED", 1)
 
 
-def test_what_happens_is_seen_by_all_at_once(site: Site, office: Drive):
+def test_every_viewer_receives_every_change(site: Site, office: Drive):
     with connect(site.live) as one, connect(site.live) as other:
         until(lambda: next_of(one, "state")["viewers"] == 2)
         office.step(25)
@@ -90,17 +90,17 @@ def test_what_happens_is_seen_by_all_at_once(site: Site, office: Drive):
         assert next_of(again, "state")["viewers"] == 1
 
 
-def test_events_reach_everybody_in_their_order(site: Site, office: Drive):
+def test_events_reach_viewers_in_order(site: Site, office: Drive):
     with connect(site.live) as viewer:
         number = next_of(viewer, "hello")["events"][-1]["number"]
         for i in range(5):
             office.store.add_event("person", f"word {i}")
-        heard = [next_of(viewer, "event") for _ in range(5)]
-        assert [event["text"] for event in heard] == [f"word {i}" for i in range(5)]
-        assert [event["number"] for event in heard] == [*range(number + 1, number + 6)]
+        received = [next_of(viewer, "event") for _ in range(5)]
+        assert [event["text"] for event in received] == [f"word {i}" for i in range(5)]
+        assert [event["number"] for event in received] == [*range(number + 1, number + 6)]
 
 
-def test_a_new_map_greets_everybody_again(office: Drive):
+def test_a_new_map_sends_hello_again(office: Drive):
     fresh = drive("office")
     with fed(store=fresh.store) as site, connect(site.live) as viewer:
         old = next_of(viewer, "hello")["map"]
@@ -117,7 +117,7 @@ def test_the_first_frames_before_there_is_a_map():
         assert len(next_of(viewer, "scan")["frame"]) == 16
 
 
-def test_orders_reach_the_localizer(site: Site, office: Drive):
+def test_commands_reach_the_localizer(site: Site, office: Drive):
     with connect(site.live) as viewer:
         viewer.send('{"type": "token", "token": "not needed"}')
         viewer.send('{"type": "pose", "x": 1.5, "y": 2.5, "yaw": 0.5}')
@@ -131,7 +131,7 @@ def test_orders_reach_the_localizer(site: Site, office: Drive):
 
 
 @pytest.mark.parametrize(
-    ("order", "words"),
+    ("command", "words"),
     [
         ("nonsense", "JSON"),
         ("[1, 2]", "Expected an object"),
@@ -142,9 +142,9 @@ def test_orders_reach_the_localizer(site: Site, office: Drive):
         (b"\x00\x01", "JSON"),
     ],
 )
-def test_what_cannot_be_done_is_told_to_who_asked(site: Site, order: str | bytes, words: str):
+def test_a_refusal_is_sent_to_its_viewer_alone(site: Site, command: str | bytes, words: str):
     with connect(site.live) as viewer, connect(site.live) as other:
-        viewer.send(order)
+        viewer.send(command)
         assert words in next_of(viewer, "error")["detail"]
         site.store.add_event("person", "and on it goes")
         while kind_of(message := other.recv(PATIENCE_S)) != "event":
@@ -152,7 +152,7 @@ def test_what_cannot_be_done_is_told_to_who_asked(site: Site, order: str | bytes
     assert site.given == []
 
 
-def test_who_may_only_watch_is_told_so(office: Drive):
+def test_a_read_only_server_refuses_commands(office: Drive):
     with fed(AccessPolicy(may_steer=False), office.store) as site, connect(site.live) as viewer:
         assert next_of(viewer, "hello")["may_steer"] is False
         viewer.send('{"type": "relocalize"}')
@@ -177,7 +177,7 @@ def test_a_message_that_is_too_long_ends_the_connection(site: Site):
 
 
 @pytest.mark.slow
-def test_there_is_an_end_to_viewers(site: Site):
+def test_the_number_of_viewers_is_limited(site: Site):
     with ExitStack() as stack:
         for _ in range(MOST_VIEWERS):
             stack.enter_context(connect(site.live)).recv(PATIENCE_S)
@@ -191,7 +191,7 @@ def test_there_is_an_end_to_viewers(site: Site):
 TOKEN = "open-sesame"  # noqa: S105 - of a test
 
 
-def test_the_right_token_opens(office: Drive):
+def test_the_right_token_is_accepted(office: Drive):
     with fed(AccessPolicy(TOKEN), office.store) as site, connect(site.live) as viewer:
         viewer.send(json.dumps({"type": "token", "token": TOKEN}))
         assert kind_of(viewer.recv(PATIENCE_S)) == "hello"
@@ -200,7 +200,7 @@ def test_the_right_token_opens(office: Drive):
 @pytest.mark.parametrize(
     "first", ['{"type": "token", "token": "wrong"}', '{"token": 7}', "[]", "", "{", b"\xff"]
 )
-def test_a_wrong_token_closes_and_nothing_is_seen(office: Drive, first: str | bytes):
+def test_a_wrong_token_closes_the_connection(office: Drive, first: str | bytes):
     with fed(AccessPolicy(TOKEN), office.store) as site, connect(site.live) as viewer:
         viewer.send(first)
         with pytest.raises(ConnectionClosed) as ended:
@@ -208,7 +208,7 @@ def test_a_wrong_token_closes_and_nothing_is_seen(office: Drive, first: str | by
         assert ended.value.rcvd.code == 4401
 
 
-def test_who_guesses_here_is_kept_waiting_too(office: Drive):
+def test_guesses_are_rate_limited(office: Drive):
     with fed(AccessPolicy(TOKEN), office.store) as site:
 
         def guess(word: str) -> None:
@@ -225,7 +225,7 @@ def test_who_guesses_here_is_kept_waiting_too(office: Drive):
         assert InvalidStatus in refusals
 
 
-def test_without_a_token_nothing_is_seen(office: Drive, monkeypatch: pytest.MonkeyPatch):
+def test_a_missing_token_closes_the_connection(office: Drive, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("firstfix.web.websocket._TOKEN_TIMEOUT_S", 0.1)
     with fed(AccessPolicy(TOKEN), office.store) as site, connect(site.live) as viewer:
         with pytest.raises(ConnectionClosed) as ended:
@@ -238,8 +238,8 @@ def reached(site: Site) -> socket.socket:
 
 
 @pytest.mark.slow
-def test_a_viewer_that_does_not_read_keeps_nobody_waiting():
-    """Frames for it are dropped; what it gets when it reads again is new."""
+def test_a_viewer_that_does_not_read_delays_no_other():
+    """Its frames are dropped; when it reads again, it receives the newest."""
     office = drive("office")
     office.step(ASLEEP + 1)
     view = office.store.snapshot
@@ -266,8 +266,8 @@ def test_a_viewer_that_does_not_read_keeps_nobody_waiting():
         assert received < 20 * 30_000
 
 
-def test_what_waits_for_a_viewer_is_bounded():
-    async def story() -> list:
+def test_the_send_buffer_of_a_viewer_is_bounded():
+    async def scenario() -> list:
         viewer = Viewer()
         for i in range(10_000):
             viewer.replace("state", f"state {i}")
@@ -276,13 +276,13 @@ def test_what_waits_for_a_viewer_is_bounded():
             viewer.replace("hello", f"hello {i}")
         return await viewer.next()
 
-    frames = asyncio.run(story())
+    frames = asyncio.run(scenario())
     assert frames[0] == "hello 9999"
     assert frames[1:-2] == [f"event {i}" for i in range(10_000 - MOST_EVENTS, 10_000)]
     assert frames[-2:] == ["state 9999", b"scan 9999"]
 
 
-def test_twenty_viewers_see_the_same(site: Site, office: Drive):
+def test_twenty_viewers_receive_the_same(site: Site, office: Drive):
     async def watch(until_stamp: float) -> list[bytes]:
         seen = []
         async with connect_async(site.live, max_queue=None, close_timeout=2.0) as viewer:
@@ -309,7 +309,9 @@ def test_twenty_viewers_see_the_same(site: Site, office: Drive):
     assert all(len(frames) <= 40 for frames in seen)
 
 
-def test_frames_are_made_once_for_all_and_not_at_all_for_nobody(monkeypatch: pytest.MonkeyPatch):
+def test_frames_are_encoded_once_for_all_viewers_and_never_without_viewers(
+    monkeypatch: pytest.MonkeyPatch,
+):
     made = []
     monkeypatch.setattr(
         "firstfix.web.broadcaster.scan_frame", lambda *_: made.append(1) or b"\x01" * 16
@@ -317,7 +319,7 @@ def test_frames_are_made_once_for_all_and_not_at_all_for_nobody(monkeypatch: pyt
     begun = drive("house")
     broadcaster = Broadcaster(begun.store, lambda: "hello", lambda: None)
 
-    async def story() -> None:
+    async def scenario() -> None:
         running = asyncio.create_task(broadcaster.run())
         await asyncio.sleep(0.01)
         begun.step(ASLEEP + 5)
@@ -332,14 +334,14 @@ def test_frames_are_made_once_for_all_and_not_at_all_for_nobody(monkeypatch: pyt
             assert b"\x01" * 16 in await viewer.next()
         running.cancel()
 
-    asyncio.run(story())
+    asyncio.run(scenario())
 
 
-def test_an_error_of_ours_does_not_end_the_show(caplog: pytest.LogCaptureFixture):
+def test_an_internal_error_does_not_stop_the_broadcast(caplog: pytest.LogCaptureFixture):
     begun = drive("house")
     broadcaster = Broadcaster(begun.store, lambda: "hello", lambda: None)
 
-    async def story() -> None:
+    async def scenario() -> None:
         running = asyncio.create_task(broadcaster.run())
         viewer = broadcaster.join()
         await viewer.next()
@@ -355,24 +357,24 @@ def test_an_error_of_ours_does_not_end_the_show(caplog: pytest.LogCaptureFixture
         assert any("all well" in text for text in await viewer.next())
         running.cancel()
 
-    asyncio.run(story())
+    asyncio.run(scenario())
     assert "could not be sent" in caplog.text
 
 
-def test_the_first_viewer_is_greeted_once():
+def test_the_first_viewer_is_reported_once():
     greeted = []
     begun = drive("house")
 
-    async def story() -> None:
+    async def scenario() -> None:
         broadcaster = Broadcaster(begun.store, lambda: "hello", lambda: greeted.append(1))
         broadcaster.leave(broadcaster.join())
         broadcaster.leave(broadcaster.join())
 
-    asyncio.run(story())
+    asyncio.run(scenario())
     assert greeted == [1]
 
 
-def test_the_end_of_the_server_is_told_and_another_one_goes_on(office: Drive):
+def test_a_stopping_server_closes_connections_with_1012(office: Drive):
     with ExitStack() as server:
         site = server.enter_context(fed(store=office.store))
         with connect(site.live) as viewer:
@@ -385,8 +387,8 @@ def test_the_end_of_the_server_is_told_and_another_one_goes_on(office: Drive):
         assert next_of(viewer, "hello")["events"]
 
 
-def test_a_story_with_a_simulated_robot():
-    """Found, helped, carried away and found again, steered by two viewers."""
+def test_two_viewers_control_a_simulated_robot():
+    """Localized, paused, among people, carried and localized again."""
     grid = WORLDS["house"]()
     with simulated(grid) as site, connect(site.live) as one, connect(site.live) as other:
         hello = next_of(one, "hello")
