@@ -57,7 +57,7 @@ def serve(pipe: Connection) -> None:
     """Show frames until told to end; answer every word with CPU time and memory so far."""
     grid, placed = office(), scans(POSES)
     store = SnapshotStore("office")
-    localizer: Any = SimpleNamespace(matcher=ScanMatcher(grid), particles=None)
+    localizer: Any = SimpleNamespace(matcher=ScanMatcher(grid), particles=None, belief=None)
     store(NewMap(0.0, grid), [], localizer)
     is_over = threading.Event()
 

@@ -9,7 +9,7 @@ import pytest
 from live_lab import drive
 
 from firstfix.core.se2 import SE2
-from firstfix.lab.worlds.catalog import random_free_poses
+from firstfix.lab.worlds.catalog import ROOM_PITCH, random_free_poses
 from firstfix.localizer.inputs import PoseHint, Reset
 from firstfix.localizer.states import State
 from firstfix.web.snapshot import SimulationStatus
@@ -94,6 +94,17 @@ def test_several_places_are_listed_with_the_scan_at_the_first():
     assert view.state is State.LOCALIZED
     assert view.hypotheses == ()
     assert kinds(begun.store) == ["map", "state", "hint", "found"]
+
+
+def test_the_belief_of_four_identical_rooms_has_a_quarter_of_the_mass_in_each():
+    begun = drive("rooms")
+    begun.step(ASLEEP + 1)
+    belief = begun.store.snapshot.belief
+    assert belief is begun.localizer.belief
+    room = np.floor(belief.poses[:, 0] / ROOM_PITCH).astype(int)
+    mass = np.bincount(room, belief.probabilities)
+    np.testing.assert_allclose(mass, 0.25, atol=0.05)
+    assert belief.elsewhere < 0.05
 
 
 def test_a_reset_discards_the_pose_and_is_no_loss():

@@ -99,6 +99,7 @@ class SnapshotStore:
             self._timeline.add_input(given)
             if isinstance(given, NewMap):
                 self._store_map(given, localizer)
+            self._snapshot = replace(self._snapshot, belief=localizer.belief)
             for output in outputs:
                 self._timeline.add_output(given, output)
                 self._store_output(output, localizer)
