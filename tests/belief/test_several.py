@@ -16,6 +16,7 @@ from firstfix.core.estimate import Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.io.maps.map_server import load_map
 from firstfix.lab.simulation.lidar import Lidar
 
@@ -69,6 +70,23 @@ def test_recorded_drives_seen_by_a_depth_camera_are_found(shared, case, first):
     assert result.verdict is Verdict.UNIQUE
     assert result.best.pose.distance_to(truth) < 0.5
     assert angle_error(result.best.pose.yaw, truth.yaw) < math.radians(10.0)
+
+
+def test_the_matcher_takes_several_scans(halls, drive):
+    scans, odometry = sequence(drive(halls.grid, START, STEPS))
+    matcher = ScanMatcher(halls.grid)
+    together = matcher.locate(scans, odometry)
+    expected = locate_several(scans, odometry, halls)
+    assert together.verdict is Verdict.UNIQUE
+    assert together.reason == expected.reason
+    assert together.best.pose == expected.best.pose
+    assert matcher.locate(scans[:3]).verdict is Verdict.AMBIGUOUS
+
+
+def test_the_method_of_the_paper_takes_one_scan(halls):
+    matcher = ScanMatcher(halls.grid, method="paper")
+    with pytest.raises(InputError, match="one scan"):
+        matcher.locate([scan_of(1.0), scan_of(1.0)], [REST, REST])
 
 
 # --- at rest ---

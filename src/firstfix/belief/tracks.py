@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from firstfix.belief.adjust import adjust, slack_between, strains
 from firstfix.belief.planar import between, compose
 from firstfix.belief.view import Observation, costs, settle_on_rays
+from firstfix.core.angles import angle_error
 from firstfix.fields.map_fields import MapFields
 
 # Beams that weigh all places, and those that weigh the few best.
@@ -19,6 +21,10 @@ CAREFUL_BEAMS = 180
 
 # The best places are refined on rays, below the size of a cell.
 RAY_PLACES = 12
+
+# Rays sharpen a pose; where they move it farther, along a corridor say, odometry knows better.
+_SHARPENED_M = 0.1
+_SHARPENED_RAD = math.radians(2.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,11 +140,20 @@ def look_again(tracks: Tracks, window: Sequence[Observation], fields: MapFields)
     sharp = settle_on_rays(few.now, seen, fields)
     gain = costs(few.now, seen, CAREFUL_BEAMS, fields) - costs(sharp, seen, CAREFUL_BEAMS, fields)
     # Rays are sharper, but in a map with smeared walls they can do harm: the better pose stays.
-    better = np.flatnonzero(gain > 0.0)
+    better = np.flatnonzero((gain > 0.0) & _are_near(few.now, sharp, fields))
     poses, cost = careful.poses.copy(), careful.costs.copy()
     poses[better, last] = sharp[better]
     cost[better, last] -= gain[better]
     return replace(careful, poses=poses, costs=cost)
+
+
+def _are_near(
+    given: NDArray[np.float64], refined: NDArray[np.float64], fields: MapFields
+) -> NDArray[np.bool_]:
+    away = np.hypot(*(refined - given)[:, :2].T) * fields.grid.resolution
+    turned = angle_error(refined[:, 2], given[:, 2])
+    near: NDArray[np.bool_] = (away <= _SHARPENED_M) & (turned <= _SHARPENED_RAD)
+    return near
 
 
 def _compare_all(tracks: Tracks, window: Sequence[Observation], fields: MapFields) -> Tracks:

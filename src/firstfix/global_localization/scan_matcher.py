@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.arguments import as_instance, as_member, as_pose
+from firstfix.core.errors import InputError
 from firstfix.core.estimate import Hypothesis, LocateResult, SearchReport, Verdict
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
@@ -89,28 +89,56 @@ class ScanMatcher:
             self._exhaustive = ExhaustiveSearch(self.fields, poses)
             self.fields.compute("pointscore", "squares", "clearance")
 
-    def locate(self, scan: LaserScan) -> LocateResult:
-        """Find where in the map a scan was taken.
+    def locate(
+        self,
+        scan: LaserScan | Sequence[LaserScan],
+        T_odom_base: Sequence[SE2] | None = None,
+    ) -> LocateResult:
+        """Find where in the map a scan was taken, or the last one of several.
 
         Parameters
         ----------
-        scan : LaserScan
-            The scan, with the sensor's pose on the robot.
+        scan : LaserScan or sequence of LaserScan
+            One scan, with the sensor's pose on the robot; or several scans of a robot that stood,
+            turned or drove a little, oldest first: they are judged together.
+        T_odom_base : sequence of SE2, optional
+            Odometry at each of several scans; by default the robot stood still.
 
         Returns
         -------
         LocateResult
-            Verdict and ranked hypotheses for ``T_map_base``.
+            Verdict and ranked hypotheses for ``T_map_base`` at the last scan.
+
+        Raises
+        ------
+        InputError
+            If several scans and their odometry do not belong together, or the method takes one
+            scan only.
         """
+        if not isinstance(scan, LaserScan) and isinstance(scan, Sequence):
+            return self._locate_several(scan, T_odom_base)
         as_instance(LaserScan, scan, "scan")
         if self._exhaustive is not None:
-            result = self._exhaustive.locate(scan)
-        else:
-            result = locate(scan, self.fields, self.config)
-        return replace(result, grid=self.fields.grid, scan=scan)
+            return self._exhaustive.locate(scan)
+        return locate(scan, self.fields, self.config)
 
-    def __repr__(self) -> str:
-        return f"<ScanMatcher {self.method.value} in {self.fields.grid!r}>"
+    def _locate_several(
+        self, scans: Sequence[LaserScan], T_odom_base: Sequence[SE2] | None
+    ) -> LocateResult:
+        # The belief is built on this package; only this method of the matcher is built on it.
+        from firstfix.belief.several import locate_several
+
+        if self._exhaustive is not None:
+            raise InputError(
+                expected='method "fast" for several scans',
+                received=f'method "{self.method.value}"',
+                remedy="give one scan, or use the default method",
+            )
+        for scan in scans:
+            as_instance(LaserScan, scan, "scan")
+        odometry = [SE2.identity()] * len(scans) if T_odom_base is None else T_odom_base
+        poses = [as_pose(pose, "T_odom_base") for pose in odometry]
+        return locate_several(scans, poses, self.fields)
 
     def score_poses(self, scan: LaserScan, poses: Sequence[SE2]) -> tuple[Hypothesis, ...]:
         """Score poses by a scan: `firstfix.global_localization.scoring.score_poses`.
