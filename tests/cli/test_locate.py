@@ -106,10 +106,10 @@ def test_both_methods_find_it(cli, unique: Files, method: str) -> None:
 
 @pytest.mark.slow
 def test_the_picture_is_drawn_where_it_was_asked_for(cli, unique: Files, tmp_path: Path) -> None:
-    ended = cli("locate", *unique, "--plot", "out/place.png")
+    ended = cli("locate", *unique, "--plot", "place.png")
     assert ended.status == 0
-    assert f"picture: {tmp_path / 'out' / 'place.png'}" in ended.err
-    assert (tmp_path / "out" / "place.png").stat().st_size > 5000
+    assert f"picture: {tmp_path / 'place.png'}" in ended.err
+    assert (tmp_path / "place.png").stat().st_size > 5000
 
 
 def test_a_scan_without_truth_has_no_error(cli, unique: Files, tmp_path: Path) -> None:

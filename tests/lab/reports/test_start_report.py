@@ -55,7 +55,7 @@ def test_every_building_has_a_row_and_every_start_too() -> None:
 @pytest.mark.slow
 def test_the_report_shows_sensors_buildings_and_the_curve(tmp_path: Path) -> None:
     document = start_document(RUNS, 7, [("c", "no odometry")])
-    page = write_start_report(RUNS, document, tmp_path / "out")
+    page = write_start_report(RUNS, document, tmp_path)
     text = page.read_text(encoding="utf-8")
     assert sensors_table(document).strip() in text
     assert buildings_table(document).strip() in text

@@ -30,7 +30,7 @@ def tracked(hall_plan: OccupancyGrid, driven: Recording) -> list[TrackedScan]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["track.png", "new/track.svg"])
+@pytest.mark.parametrize("name", ["track.png", "track.svg"])
 def test_a_track_becomes_a_picture(
     tmp_path: Path, hall_plan: OccupancyGrid, tracked: list[TrackedScan], name: str
 ) -> None:
