@@ -45,7 +45,7 @@ def test_places_that_look_alike_are_told_instead_of_a_pose(ros1: Lab) -> None:
     robot = ros1.robot("twins")
     told = watcher.wait_for("localization_status", state="DISAMBIGUATING")
     assert told["level"] == 1
-    assert "fit about equally well" in told["message"]
+    assert "4 places look identical to this sensor" in told["message"]
     assert len(watcher.wait_for("hypotheses")["places"]) == int(told["hypotheses"]) > 1
     time.sleep(A_WHILE_S)
     assert not watcher.lines("initialpose")

@@ -72,7 +72,7 @@ def test_a_robot_that_is_carried_away_is_found_where_it_is_set_down(ros1: Lab) -
     robot.tell(go=True)
     lifted = watcher.wait_for("events/wheel_drop", state=1)
     lost = watcher.wait_for("localization_status", state="LIFTED", after=lifted["at"] - 0.5)
-    assert "waiting until the robot stands again" in lost["message"]
+    assert "waiting until the robot is set down" in lost["message"]
     assert lost["level"] == 1
     standing = watcher.wait_for("events/wheel_drop", after=lifted["at"] + 1.0, state=0)
     again = watcher.wait_for("initialpose", after=lost["at"])

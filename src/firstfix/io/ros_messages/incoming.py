@@ -1,6 +1,6 @@
-"""ROS messages, whoever decoded them, to core types.
+"""ROS messages to core types.
 
-Nothing here imports ROS: a message is anything with the fields of its definition, from rospy,
+Nothing here imports ROS: a message is any object with the fields of its definition, from rospy,
 rclpy or a bag.
 """
 
@@ -17,17 +17,17 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan, Mounting
 from firstfix.core.se2 import SE2
 
-# A unit quaternion that lost more than this is not a rotation any more.
+# A quaternion with a smaller norm is not a rotation.
 MIN_NORM = 1e-3
 
 FARTHEST_M = 1e9
-"""Nothing on a robot or in its map is farther from its parent; sums of such numbers stay finite."""
+"""Largest translation of a transform, m; sums of such numbers stay finite."""
 
 _MAP_REMEDY = "look for the node that publishes the map"
 
 
 class StampedTransform(NamedTuple):
-    """``T_parent_child`` at one time, still in space.
+    """``T_parent_child`` at one time, in 3D.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class StampedTransform(NamedTuple):
     translation : tuple of float
         x, y, z, m.
     rotation : tuple of float
-        Unit quaternion x, y, z, w; four NaN if the message had none.
+        Unit quaternion x, y, z, w; four NaN if the message has none.
     """
 
     parent: str
@@ -76,7 +76,7 @@ def to_nanoseconds(stamp: Any) -> int:
 
 
 def to_frame(name: str) -> str:
-    """Return the name of a frame as tf2 writes it: old ROS 1 nodes put a slash before it."""
+    """Return the name of a frame without the leading slash of old ROS 1 nodes."""
     return name.removeprefix("/")
 
 
@@ -90,7 +90,7 @@ def to_laser_scan(
     """Convert a ``sensor_msgs/LaserScan``.
 
     Beams follow ``angle_increment`` from ``angle_min``, whatever its sign; ``angle_max`` is not
-    looked at, because drivers disagree whether it is that of the last beam.
+    used: drivers disagree whether it belongs to the last beam.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def to_laser_scan(
     T_base_laser : SE2
         Pose of the sensor on the robot.
     mounting : Mounting
-        Which way up it is.
+        Upright or upside down.
     stamp : float or None
         Time to use instead of the one in the header, s.
 
@@ -132,7 +132,7 @@ def to_grid(message: Any) -> OccupancyGrid:
     Parameters
     ----------
     message : message
-        The map; a yaw of its origin counts, a tilt does not.
+        The map; the yaw of its origin is used, a tilt is ignored.
 
     Returns
     -------
@@ -152,7 +152,7 @@ def to_grid(message: Any) -> OccupancyGrid:
             received=f"{cells.size}",
             remedy=_MAP_REMEDY,
         )
-    x, y, yaw = _shadow(
+    x, y, yaw = _project(
         (info.origin.position.x, info.origin.position.y), _map_rotation(info.origin.orientation)
     )
     if not _is_place(x, y, yaw):
@@ -161,8 +161,8 @@ def to_grid(message: Any) -> OccupancyGrid:
             received=f"position ({x}, {y}) and a yaw of {yaw}",
             remedy=_MAP_REMEDY,
         )
-    with np.errstate(over="ignore"):  # infinite then, which no map is
-        # 0.05 travels as 0.05000000074505806: what was meant is the shortest that reads the same.
+    with np.errstate(over="ignore"):  # infinite then, which OccupancyGrid refuses
+        # 0.05 travels as 0.05000000074505806: the shortest number with the same float32 is meant.
         resolution = float(str(np.float32(info.resolution)))
     return OccupancyGrid(cells.reshape(height, width), resolution, SE2(x, y, yaw))
 
@@ -229,13 +229,13 @@ def to_pressed(message: Any) -> tuple[int, bool]:
     Returns
     -------
     tuple of int and bool
-        Which of the sensors of this kind (left, centre, right; 0 for a Bool), and whether it has
-        begun to report: a cliff, a dropped wheel, a pressed bumper.
+        Number of the sensor (left, centre, right; 0 for a Bool), and whether it is active: a cliff,
+        a dropped wheel, a pressed bumper.
 
     Raises
     ------
     InputError
-        If it is another message: who hears any type that is published takes what comes.
+        If it is another message: the subscriber of ROS 1 accepts any type.
     """
     if isinstance(getattr(message, "data", None), (bool, np.bool_)):
         return 0, bool(message.data)
@@ -278,8 +278,8 @@ def to_planar(transform: StampedTransform) -> SE2:
 
 
 def planar(transform: StampedTransform) -> tuple[float, float, float]:
-    """Return what `to_planar` does as x (m), y (m), yaw (rad), NaN where it is not known."""
-    return _shadow(transform.translation[:2], transform.rotation)
+    """Return x (m), y (m), yaw (rad) of `to_planar`; NaN where unknown."""
+    return _project(transform.translation[:2], transform.rotation)
 
 
 def _cells(data: Any) -> NDArray[np.int8]:
@@ -301,7 +301,7 @@ def _cells(data: Any) -> NDArray[np.int8]:
 
 
 def _map_rotation(rotation: Any) -> tuple[float, float, float, float]:
-    """Return a unit quaternion; of a map that says none, rviz and AMCL think that it has none."""
+    """Return a unit quaternion; all zeros mean no rotation, as in RViz and AMCL."""
     if rotation.x == rotation.y == rotation.z == rotation.w == 0.0:
         return 0.0, 0.0, 0.0, 1.0
     return _normalized(rotation)
@@ -311,11 +311,11 @@ def _is_place(x: float, y: float, yaw: float) -> bool:
     return abs(x) <= FARTHEST_M and abs(y) <= FARTHEST_M and math.isfinite(yaw)
 
 
-def _shadow(
+def _project(
     translation: tuple[float, float], rotation: tuple[float, float, float, float]
 ) -> tuple[float, float, float]:
     x, y, z, w = rotation
-    # atan2(R[1, 0], R[0, 0]): where the x axis points, also upside down.
+    # atan2(R[1, 0], R[0, 0]): direction of the x axis, also upside down.
     yaw = math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
     return float(translation[0]), float(translation[1]), yaw
 
@@ -323,7 +323,7 @@ def _shadow(
 def _normalized(rotation: Any) -> tuple[float, float, float, float]:
     q = (float(rotation.x), float(rotation.y), float(rotation.z), float(rotation.w))
     norm = math.hypot(*q)
-    # An unset quaternion is all zeros, which some nodes send for "not known"; others send NaN.
+    # For an unknown rotation some nodes send zeros, others NaN.
     x, y, z, w = (v / norm for v in q) if MIN_NORM < norm < math.inf else (math.nan,) * 4
     return x, y, z, w
 

@@ -1,7 +1,7 @@
-"""Core types to ROS messages, whoever will send them.
+"""Core types to ROS messages.
 
-Nothing here imports ROS. A transport gives a function ``make("package/Type", **fields)``, because
-classes of rospy, rclpy and rosbags are all built from the fields of their definition by name.
+Nothing here imports ROS. A transport provides a function ``make("package/Type", **fields)``: rospy,
+rclpy and rosbags all build messages from the named fields of their definition.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def pose(make: Make, T: SE2) -> Any:
     return make(
         "geometry_msgs/Pose",
         position=make("geometry_msgs/Point", x=T.x, y=T.y, z=0.0),
-        orientation=_turned(make, T.yaw),
+        orientation=_yaw_rotation(make, T.yaw),
     )
 
 
@@ -172,7 +172,7 @@ def transforms(
         transform=make(
             "geometry_msgs/Transform",
             translation=make("geometry_msgs/Vector3", x=T.x, y=T.y, z=0.0),
-            rotation=_turned(make, T.yaw),
+            rotation=_yaw_rotation(make, T.yaw),
         ),
     )
     return make("tf2_msgs/TFMessage", transforms=[stamped])
@@ -195,13 +195,13 @@ def diagnostics(
     stamp : float or ExactTime
         Time, s or exact.
     name : str
-        What the status is of.
+        Name of the component.
     level : Level
-        How grave it is.
+        Severity.
     message : str
-        For a person.
+        Text for people.
     values : mapping of str to str
-        For a program.
+        Keys and values for programs.
 
     Returns
     -------
@@ -261,7 +261,7 @@ def place_markers(
 
 
 def laser_scan(make: Make, frame: str, scan: LaserScan) -> Any:
-    """Build a ``sensor_msgs/LaserScan``; where the sensor sits is for ``tf`` to tell.
+    """Build a ``sensor_msgs/LaserScan``; ``tf`` has the pose of the sensor.
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ def laser_scan(make: Make, frame: str, scan: LaserScan) -> Any:
     Returns
     -------
     message
-        Without intensities and times of its own beams.
+        Without intensities and beam times.
     """
     n = len(scan.ranges)
     return make(
@@ -294,7 +294,7 @@ def laser_scan(make: Make, frame: str, scan: LaserScan) -> Any:
 
 
 def occupancy_grid(make: Make, stamp: float, frame: str, grid: OccupancyGrid) -> Any:
-    """Build a ``nav_msgs/OccupancyGrid``; what nobody has seen is unknown there.
+    """Build a ``nav_msgs/OccupancyGrid``.
 
     Parameters
     ----------
@@ -345,6 +345,6 @@ def odometry(make: Make, stamp: float, odom: str, base: str, T_odom_base: SE2) -
     )
 
 
-def _turned(make: Make, yaw: float) -> Any:
+def _yaw_rotation(make: Make, yaw: float) -> Any:
     half = 0.5 * yaw
     return make("geometry_msgs/Quaternion", x=0.0, y=0.0, z=math.sin(half), w=math.cos(half))

@@ -1,4 +1,4 @@
-"""Where a sensor sits on a robot that drives on a floor."""
+"""The planar pose of a sensor on its robot."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class SensorPlace(NamedTuple):
 
 
 def place_of(frame: str, T_base_laser: NDArray[np.float64]) -> SensorPlace:
-    """Project the pose of a sensor in space onto the floor.
+    """Project the 3D pose of a sensor onto the floor.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def place_of(frame: str, T_base_laser: NDArray[np.float64]) -> SensorPlace:
 
 
 def unknown_place(frame: str) -> SensorPlace:
-    """Return the place of a sensor that nothing is known about: it is its own base."""
+    """Return the place of a sensor without transforms: its frame is the base."""
     note = (
         f"no fixed transforms lead from the base to {frame or 'the unnamed frame'} of the scans: "
         "poses are those of the sensor, and odometry is left out"

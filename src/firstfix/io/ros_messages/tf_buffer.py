@@ -1,4 +1,4 @@
-"""Where a robot's frames are, now and at the stamp of a scan: what a node knows of ``tf``."""
+"""A buffer of transforms, looked up at the stamp of a scan; the part of tf2 that a node needs."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from firstfix.io.ros_messages.incoming import FARTHEST_M, StampedTransform
 from firstfix.io.ros_messages.transforms import inverse, matrix
 
 KEPT_S = 10.0
-"""How long moving transforms are remembered, s: as long as tf2 does."""
+"""How long moving transforms are kept, s; the same as in tf2."""
 
 
 @dataclass(frozen=True, slots=True)
 class LookupFailure:
-    """Why a transform is not known.
+    """Why a transform is unknown.
 
     Parameters
     ----------
     why : str
-        For a person: which link is missing, or which time.
+        For people: the missing link or time.
     later : bool
-        True if it will be known as soon as newer transforms come.
+        True if newer transforms will make it known.
     """
 
     why: str
@@ -35,7 +35,7 @@ class LookupFailure:
 
 @dataclass(eq=False, slots=True)
 class _Edge:
-    """``T_parent_child`` of one child: the last if it is fixed, else those of the last seconds."""
+    """``T_parent_child`` of one child: one if it is fixed, else those of the last seconds."""
 
     parent: str
     fixed: bool
@@ -47,7 +47,7 @@ class _Edge:
                 self.moves.clear()
             self.moves.append(new)
         else:
-            # Two nodes that publish one link, or a message that came late.
+            # Two nodes publish one link, or a message was late.
             at = bisect_left(self.moves, new.stamp, key=_stamp)
             if self.moves[at].stamp == new.stamp:
                 self.moves[at] = new
@@ -58,27 +58,27 @@ class _Edge:
 
 
 class TransformBuffer:
-    """Frames of one robot; the newest parent of a frame counts."""
+    """Frames of one robot; the newest parent of a frame is used."""
 
     def __init__(self) -> None:
         self._edges: dict[str, _Edge] = {}
 
     def add(self, transform: StampedTransform) -> None:
-        """Take in a transform that moves, from ``tf``; older ones may come later than newer ones.
+        """Add a transform from ``tf``; messages may arrive out of order.
 
         Parameters
         ----------
         transform : StampedTransform
-            One whose numbers are not finite, or beyond `FARTHEST_M`, is left out.
+            Ignored if a number is not finite, or beyond `FARTHEST_M`.
         """
         self._add(transform, fixed=False)
 
     def add_static(self, transform: StampedTransform) -> None:
-        """Take in a transform that holds for all times, from ``tf_static``."""
+        """Add a transform from ``tf_static``."""
         self._add(transform, fixed=True)
 
     def discard_moving(self) -> None:
-        """Forget all but the fixed transforms: the clock was set back."""
+        """Discard all but the fixed transforms: the clock was set back."""
         self._edges = {child: edge for child, edge in self._edges.items() if edge.fixed}
 
     @property
@@ -87,7 +87,7 @@ class TransformBuffer:
         return tuple(sorted({*self._edges, *(edge.parent for edge in self._edges.values())}))
 
     def newest(self, target: str, source: str) -> float | LookupFailure:
-        """Find the last time at which a transform is known.
+        """Return the last time at which a transform is known.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class TransformBuffer:
         return min((e.moves[-1].stamp for e in edges if not e.fixed), default=math.inf)
 
     def links(self, target: str, source: str) -> tuple[str, ...] | LookupFailure:
-        """Find the links between two frames.
+        """Return the links between two frames.
 
         Parameters
         ----------
@@ -118,8 +118,8 @@ class TransformBuffer:
         tuple of str or LookupFailure
             The child of each.
         """
-        ways = self._ways(target, source)
-        return ways if isinstance(ways, LookupFailure) else (*ways[0], *ways[1])
+        branches = self._branches(target, source)
+        return branches if isinstance(branches, LookupFailure) else (*branches[0], *branches[1])
 
     def at(self, target: str, source: str, stamp: float) -> NDArray[np.float64] | LookupFailure:
         """Chain transforms at a time, interpolated where they move.
@@ -136,13 +136,13 @@ class TransformBuffer:
         ndarray, shape (4, 4), or LookupFailure
             ``T_target_source`` in space.
         """
-        ways = self._ways(target, source)
-        if isinstance(ways, LookupFailure):
-            return ways
+        branches = self._branches(target, source)
+        if isinstance(branches, LookupFailure):
+            return branches
         T_top = []
-        for way in ways:
+        for branch in branches:
             T_top_frame = np.eye(4)
-            for frame in way:
+            for frame in branch:
                 link = self._link(frame, stamp)
                 if isinstance(link, LookupFailure):
                     return link
@@ -160,9 +160,9 @@ class TransformBuffer:
             edge = self._edges[new.child] = _Edge(new.parent, fixed)
         edge.add(new)
 
-    def _ways(self, target: str, source: str) -> tuple[list[str], list[str]] | LookupFailure:
-        """Return the frames from each of two up to, but without, the lowest that is above both."""
-        up = {frame: self._above(frame) for frame in (target, source)}
+    def _branches(self, target: str, source: str) -> tuple[list[str], list[str]] | LookupFailure:
+        """Return the frames from each of two up to their lowest common ancestor, without it."""
+        up = {frame: self._ancestors(frame) for frame in (target, source)}
         above_target = set(up[target])
         top = next((frame for frame in up[source] if frame in above_target), None)
         if top is not None:
@@ -176,8 +176,8 @@ class TransformBuffer:
         below = [f"{frame} (below {frames[-1]})" for frame, frames in up.items()]
         return LookupFailure(f"no transforms join {' and '.join(below)}")
 
-    def _above(self, frame: str) -> list[str]:
-        """Return a frame and those above it, up to the root, or around a loop once."""
+    def _ancestors(self, frame: str) -> list[str]:
+        """Return a frame and its ancestors, up to the root, or around a loop once."""
         frames = [frame]
         while (edge := self._edges.get(frames[-1])) is not None and edge.parent not in frames:
             frames.append(edge.parent)

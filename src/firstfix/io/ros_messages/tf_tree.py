@@ -1,4 +1,4 @@
-"""Which frames of a robot are fixed to each other, and how odometry moves them."""
+"""The fixed transforms and the odometry of a whole log."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class _Edge:
 
 
 class TransformTree:
-    """Transforms of a log, taken in one by one, then asked.
+    """Transforms of a log: added one by one, then looked up.
 
     Frames are fixed to each other if the transform between them never changed by more than
     `MAX_PLAY_M` and `MAX_PLAY_RAD`. Those whose parent is an odometry frame (``odom`` in its
@@ -45,7 +45,7 @@ class TransformTree:
         self._edges: dict[tuple[str, str], _Edge] = {}
 
     def add(self, transforms: Iterable[StampedTransform]) -> None:
-        """Take in transforms, in any order."""
+        """Add transforms, in any order."""
         for new in transforms:
             if is_odometry_frame(new.parent):
                 self.add_odometry((new,))
@@ -57,7 +57,7 @@ class TransformTree:
                 edge.fixed = _alike(edge.first, new)
 
     def add_odometry(self, transforms: Iterable[StampedTransform]) -> None:
-        """Take in transforms that are odometry, whatever their frames are called."""
+        """Add transforms that are odometry, whatever the names of their frames."""
         for new in transforms:
             edge = self._edges.setdefault((new.parent, new.child), _Edge(new, fixed=False))
             edge.fixed = False
@@ -87,7 +87,7 @@ class TransformTree:
         return reached.get(source)
 
     def base_of(self, laser: str) -> str | None:
-        """Find the frame of the robot that a sensor is fixed to.
+        """Return the frame of the robot to which a sensor is fixed.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class TransformTree:
         return next((f for f in (*named, *moved) if self.fixed(f, laser) is not None), None)
 
     def odometry(self, base: str) -> Trajectory | None:
-        """Find how odometry moves the base.
+        """Return the odometry of the base.
 
         Parameters
         ----------
@@ -135,7 +135,7 @@ class TransformTree:
 
 
 def is_odometry_frame(name: str) -> bool:
-    """Say whether a frame is called after odometry: ``odom``, ``robot1/odom_combined``."""
+    """Return whether a name is that of an odometry frame: ``odom``, ``robot1/odom_combined``."""
     return "odom" in name.rpartition("/")[2]
 
 

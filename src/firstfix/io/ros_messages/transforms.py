@@ -1,4 +1,4 @@
-"""Transforms in space as matrices, and their shadow on the floor."""
+"""3D transforms as matrices, and their projection onto the floor."""
 
 from __future__ import annotations
 
@@ -33,5 +33,5 @@ def inverse(T: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def flat(T: NDArray[np.float64]) -> SE2:
-    """Project a transform in space, shape (4, 4), onto the floor; SE2 of its x axis."""
+    """Project a 3D transform, shape (4, 4), onto the floor: x, y and the yaw of its x axis."""
     return SE2(float(T[0, 3]), float(T[1, 3]), math.atan2(T[1, 0], T[0, 0]))
