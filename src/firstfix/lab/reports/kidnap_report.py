@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -146,8 +146,7 @@ def kidnap_document(
                 "world": run.world,
                 "kind": run.kind,
                 "seed": run.seed,
-                "stamp": incident.stamp,
-                "what": incident.what,
+                **asdict(incident),
                 "said": list(incident.said),
             }
             for run in runs

@@ -9,7 +9,7 @@ The JSON document::
      "buildings": [{"site", ...the same keys...}, ...],
      "cases": [{"name", "site", ...the same keys...}, ...],
      "starts": [{"case", "site", "sensor", "scan", "ending", "way_m", "time_s", "scans", "reports",
-                 "listed", "elsewhere", "cpu_s"}, ...],
+                 "listed", "elsewhere", "cpu_ms"}, ...],
      "left_out": [{"name", "why"}, ...]}
 """
 
@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -72,21 +73,7 @@ def start_document(
             runs, lambda run: {"name": run.case, "site": run.site, "sensor": run.sensor}
         ),
         "starts": [
-            {
-                "case": run.case,
-                "site": run.site,
-                "sensor": run.sensor,
-                "scan": run.scan,
-                "ending": run.ending.value,
-                "way_m": run.way_m,
-                "time_s": run.time_s,
-                "scans": run.scans,
-                "reports": run.reports,
-                "listed": run.listed,
-                "elsewhere": run.elsewhere,
-                "cpu_s": sum(run.cpu_ms) / 1e3,
-            }
-            for run in runs
+            {**asdict(run), "ending": run.ending.value, "cpu_ms": sum(run.cpu_ms)} for run in runs
         ],
         "left_out": [{"name": name, "why": why} for name, why in left_out],
     }
