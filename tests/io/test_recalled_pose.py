@@ -45,7 +45,7 @@ STEPS = st.builds(SE2, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-3.
 
 
 @given(POSES, POSES, STEPS)
-def test_the_increment_of_odometry_is_applied_whatever_the_frames(T_map_base, T_odom_base, step):
+def test_the_increment_of_odometry_is_applied_for_any_frames(T_map_base, T_odom_base, step):
     assume((T_odom_base @ step).distance_to(SE2.identity()) > 0.1)
     now = recalled(T_odom_base @ step, saved(T_map_base, T_odom_base), max_jump_m=2.0).T_map_base
     expected = T_map_base @ step

@@ -17,7 +17,7 @@ def loaded(text: str):
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "message"),
     [
         ("a: &a 1\nb: *a", "anchors or aliases"),
         ("a: " + "[" * 100, "deep nesting"),
@@ -31,8 +31,8 @@ def loaded(text: str):
         ("word", "word"),
     ],
 )
-def test_invalid_files_are_rejected_with_file_and_example(text, says):
-    with pytest.raises(InputError, match=says) as caught:
+def test_invalid_files_are_rejected_with_file_and_example(text, message):
+    with pytest.raises(InputError, match=message) as caught:
         loaded(text)
     assert "params.yaml" in caught.value.expected
     assert "amcl:" in caught.value.remedy

@@ -76,7 +76,7 @@ def test_a_covariance_of_zeros_is_valid():
 
 
 @pytest.mark.parametrize(
-    ("changes", "says"),
+    ("changes", "message"),
     [
         ({"covariance": np.full((3, 3), np.nan)}, "finite"),
         ({"covariance": np.diag([1.0, 1.0, np.inf])}, "finite"),
@@ -92,8 +92,8 @@ def test_a_covariance_of_zeros_is_valid():
         ({"T_odom_base": SE2(0.0, -1e10, 0.0)}, "position"),
     ],
 )
-def test_invalid_poses_are_rejected(changes, says):
-    with pytest.raises(InputError, match=says):
+def test_invalid_poses_are_rejected(changes, message):
+    with pytest.raises(InputError, match=message):
         pose(**changes)
 
 

@@ -40,19 +40,19 @@ def test_messages_of_another_type_on_the_topic_are_left_out(ros1) -> None:
     assert len(load_bag(path)) == 3
 
 
-def test_an_index_that_points_to_another_topic_is_told(ros1) -> None:
+def test_an_index_that_points_to_another_topic_is_rejected(ros1) -> None:
     path = ros1.robot().write()
     data = path.read_bytes()
     mark = b"conn=\x02\x00\x00\x00"  # in the order of writing: /tf_static, /tf, /scan
     places = [i for i in range(len(data)) if data.startswith(mark, i)]
-    told = 0
+    rejected = 0
     for i in places:
         path.write_bytes(data[:i] + b"conn=\x01" + data[i + 6 :])
         try:
             load_bag(path)
         except ScanError as error:
-            told += "a message of /tf on /scan" in str(error)
-    assert told >= 3  # each of the three scans
+            rejected += "a message of /tf on /scan" in str(error)
+    assert rejected >= 3  # each of the three scans
 
 
 def _break(storage: str, path: Path, change: Callable[[bytearray], bytearray]) -> None:
@@ -62,14 +62,14 @@ def _break(storage: str, path: Path, change: Callable[[bytearray], bytearray]) -
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.3, 0.9])
-def test_a_truncated_bag_is_told(bag, share: float) -> None:
+def test_a_truncated_bag_is_rejected(bag, share: float) -> None:
     path = bag.robot(200).write()
     _break(bag.storage, path, lambda data: data[: int(share * len(data))])
     with pytest.raises(ScanError, match="a ROS bag that can be read"):
         load_bag(path)
 
 
-def test_a_damaged_message_is_told(bag) -> None:
+def test_a_damaged_message_is_rejected(bag) -> None:
     path = bag.robot().write()
     mark = b"\x05\x00\x00\x00laser"  # the length of the frame's name, in a scan
 

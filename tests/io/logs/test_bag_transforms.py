@@ -25,7 +25,7 @@ def pitched(pitch: float) -> tuple[float, float, float, float]:
 
 
 @pytest.mark.parametrize("yaw", [-2.0, 0.0, 0.6])
-def test_an_upside_down_sensor_sees_what_space_says(bag, yaw: float) -> None:
+def test_scans_of_an_upside_down_sensor_agree_with_rotations_in_space(bag, yaw: float) -> None:
     bag.tf("base_link", "laser", (0.2, 0.1, 0.3), turned_over(yaw))
     bag.scan(1.0, ranges=(1.0, 2.0, 3.0), angle_min=0.3)
     scan = load_bag(bag.write()).scans[0]
@@ -136,7 +136,7 @@ def test_odometry_is_sorted_and_each_stamp_is_kept_once(bag) -> None:
     assert_array_equal(odometry.poses[:, 0], [1, 2, 4])
 
 
-def test_what_a_localizer_published_is_not_the_truth(bag) -> None:
+def test_poses_of_a_localizer_are_not_ground_truth(bag) -> None:
     bag.robot().tf("map", "odom", (5.0, 0.0, 0.0), topic="/tf")
     recording = load_bag(bag.write())
     assert recording.truth is None
@@ -160,7 +160,7 @@ def test_two_sensors_on_one_topic_are_refused_without_transforms(bag) -> None:
         load_bag(bag.write())
 
 
-def test_a_slight_tilt_is_said_and_a_steep_one_refused(bag) -> None:
+def test_a_slight_tilt_is_noted_and_a_steep_one_rejected(bag) -> None:
     bag.tf("base_link", "slight", q=pitched(math.radians(10)))
     bag.tf("base_link", "steep", q=pitched(math.radians(90)))
     bag.scan(1.0, frame="slight", topic="/slight")

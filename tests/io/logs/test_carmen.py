@@ -101,7 +101,7 @@ def test_a_log_can_set_a_nearer_limit_but_no_farther_one(write: Write) -> None:
     assert_array_equal(load_carmen(far).scans[0].no_return, [False, True])
 
 
-def test_a_new_line_says_where_its_beams_point(write: Write) -> None:
+def test_a_new_line_has_the_bearings_of_its_beams(write: Write) -> None:
     recording = load_carmen(write(robot_laser()))
     scan = recording.scans[0]
     assert_allclose(scan.bearings, [-1.0, -0.5, 0.0, 0.5, 1.0])
@@ -158,8 +158,8 @@ def test_corrected_poses_do_not_place_the_laser(write: Write) -> None:
     for recording in (load_carmen(write(*lines[1:])), load_carmen(write(*lines[1:]), max_scans=2)):
         assert recording.scans[0].T_base_laser == SE2.identity()
         assert "corrected" in recording.notes[0]
-    said = load_carmen(write("PARAM robot_frontlaser_offset 0.0 nohost 0", *lines))
-    assert said.notes == ()
+    recording = load_carmen(write("PARAM robot_frontlaser_offset 0.0 nohost 0", *lines))
+    assert recording.notes == ()
 
 
 def test_a_rear_laser_looks_backwards(write: Write) -> None:
@@ -322,7 +322,7 @@ def test_damage_is_always_a_scan_error(write: Write, data: st.DataObject, name: 
 
 
 @pytest.mark.shared
-def test_a_real_log_sees_what_the_case_of_its_building_holds(shared: Path) -> None:
+def test_a_real_log_equals_the_case_of_its_building(shared: Path) -> None:
     recording = load_carmen(shared / "bags" / "intel.carmen.log.gz")
     case = np.load(shared / "cases" / "intel_lab" / "scans.npz")
     assert len(recording) == 910

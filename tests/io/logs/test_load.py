@@ -81,20 +81,20 @@ def test_a_bag_folder_without_metadata_names_the_file_to_give(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("name", ["a.txt", "a.gz", "a.csv.gz", "a", "a.db3.zstd", "scans.npy"])
-def test_other_files_are_told(tmp_path: Path, name: str) -> None:
+def test_other_files_are_rejected(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text(LOG)
     with pytest.raises(ScanError, match=r"a recording: \.npz, \.bag"):
         load_recording(tmp_path / name)
 
 
-def test_what_is_not_there_is_told(tmp_path: Path) -> None:
+def test_missing_files_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(ScanError, match=r"no file .*check the path"):
         load_recording(tmp_path / "missing.bag")
     with pytest.raises(ScanError, match=r"the folder .* without a metadata"):
         load_recording(tmp_path)
 
 
-def test_an_unfinished_ros1_bag_says_how_to_finish_it(tmp_path: Path) -> None:
+def test_the_error_of_an_unfinished_ros1_bag_names_the_repair(tmp_path: Path) -> None:
     path = tmp_path / "a.bag.active"
     path.write_bytes(b"#ROSBAG V2.0\n")
     with pytest.raises(ScanError, match="rosbag reindex"):
@@ -103,7 +103,9 @@ def test_an_unfinished_ros1_bag_says_how_to_finish_it(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", [".npz", ".bag", ".db3", ".mcap", ".log", ".log.gz"])
 @pytest.mark.parametrize("content", [b"", b"not a recording", bytes(range(256)) * 64])
-def test_a_right_suffix_on_wrong_bytes_is_told(tmp_path: Path, suffix: str, content: bytes) -> None:
+def test_wrong_bytes_under_a_valid_suffix_are_rejected(
+    tmp_path: Path, suffix: str, content: bytes
+) -> None:
     path = tmp_path / f"a{suffix}"
     path.write_bytes(content)
     with pytest.raises(ScanError):

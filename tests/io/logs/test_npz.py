@@ -115,7 +115,7 @@ def test_max_scans_limits_all_arrays(write: Write) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "says"),
+    ("changes", "message"),
     [
         ({"ranges": None}, "the array `ranges`"),
         ({"range_max": None}, "the array `range_max`"),
@@ -139,8 +139,10 @@ def test_max_scans_limits_all_arrays(write: Write) -> None:
         ({"T_base_laser": [0.0, np.nan, 0.0]}, "finite numbers"),
     ],
 )
-def test_inconsistent_arrays_are_rejected(write: Write, changes: dict[str, Any], says: str) -> None:
-    with pytest.raises(ScanError, match=says):
+def test_inconsistent_arrays_are_rejected(
+    write: Write, changes: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ScanError, match=message):
         load_npz(write(**changes))
 
 

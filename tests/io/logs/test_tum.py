@@ -57,7 +57,7 @@ def test_a_saved_trajectory_is_loaded_unchanged(tmp_path, stamps, poses):
 
 
 def test_comments_blank_lines_and_white_space_are_skipped(load):
-    text = b"# by somebody, \xe9\r\n\r\n  1 2 3 4 0 0 0 1  \r\n#\n\n2\t3 4 0 0 0 0 -1"
+    text = b"# by an author, \xe9\r\n\r\n  1 2 3 4 0 0 0 1  \r\n#\n\n2\t3 4 0 0 0 0 -1"
     assert_array_equal(load(text).poses, [[2, 3, 0], [3, 4, 0]])
 
 
@@ -76,7 +76,7 @@ def test_a_small_tilt_keeps_the_heading(load, yaw, tilt_deg):
 
 
 @pytest.mark.parametrize(
-    ("line", "says"),
+    ("line", "message"),
     [
         ("1 2 3 4 0 0 1", "eight finite numbers"),
         ("1 2 3 4 0 0 0 1 9", "eight finite numbers"),
@@ -97,8 +97,8 @@ def test_a_small_tilt_keeps_the_heading(load, yaw, tilt_deg):
         ("1" * 5000, "lines of at most 4096 bytes"),
     ],
 )
-def test_an_invalid_line_is_reported_with_its_number(load, line, says):
-    with pytest.raises(InputError, match=says) as caught:
+def test_an_invalid_line_is_reported_with_its_number(load, line, message):
+    with pytest.raises(InputError, match=message) as caught:
         load(f"# comment\n0 0 0 0 0 0 0 1\n{line}\n")
     assert "line 3 of " in caught.value.received
     assert "\n" not in str(caught.value)

@@ -60,7 +60,7 @@ GOOD = {
 
 
 def drawn(*extra: int) -> np.ndarray:
-    """Draw a walled hall of 2.5 m by 2 m with unknown space beside it, and some extra greys."""
+    """Draw a walled hall of 2.5 m by 2 m next to unknown space, and some extra greys."""
     greys = np.full((50, 60), 254, np.uint8)
     greys[0] = greys[-1] = 0
     greys[:, 50:] = 205
@@ -137,15 +137,15 @@ def test_smoothed_images(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("grey", "says"),
+    ("grey", "message"),
     [
         (254, "all cells are free, so no scan can match"),
         (205, "all cells are unknown"),
         (0, "no cell is free, so there is no place for the robot"),
     ],
 )
-def test_maps_of_one_grey(tmp_path, grey, says):
-    assert says in traps(tmp_path, np.full((50, 60), grey, np.uint8))
+def test_maps_of_one_grey(tmp_path, grey, message):
+    assert message in traps(tmp_path, np.full((50, 60), grey, np.uint8))
 
 
 def test_no_wall(tmp_path):

@@ -1,4 +1,4 @@
-"""The YAML of a map: how it is found, which values are accepted, and what each error says."""
+"""The YAML of a map: how it is found, which values are accepted, and the message of each error."""
 
 import math
 import os
@@ -223,7 +223,7 @@ BILLION_LAUGHS = "a: &a [x, x]\n" + "".join(
 
 
 @pytest.mark.parametrize(
-    ("data", "says"),
+    ("data", "message"),
     [
         (BILLION_LAUGHS.encode(), "anchors or aliases"),
         (b"[" * 30_000, "deep nesting"),
@@ -242,8 +242,8 @@ BILLION_LAUGHS = "a: &a [x, x]\n" + "".join(
         (b"a: 1\n" * 20_000, "at most 32768 bytes"),
     ],
 )
-def test_invalid_yaml_is_rejected_with_the_reason(read, data, says):
-    with pytest.raises(MapError, match=says):
+def test_invalid_yaml_is_rejected_with_the_reason(read, data, message):
+    with pytest.raises(MapError, match=message):
         read(data)
 
 

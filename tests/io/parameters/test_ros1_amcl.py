@@ -15,7 +15,7 @@ def test_the_new_names_exist_and_the_old_ones_do_not():
 
 
 @pytest.mark.parametrize("old", sorted(NEW_NAMES))
-def test_the_remedy_says_the_new_name(old):
+def test_the_remedy_has_the_new_name(old):
     assert NEW_NAMES[old] in (ros1_remedy(old, "0.2") or "")
 
 

@@ -66,7 +66,7 @@ def test_a_section_may_be_empty(read):
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "message"),
     [
         ("a: {ros__parameters: {}}\nb: {c: {ros__parameters: {}}}", "only '/a, /b/c'"),
         ("/**: {ros__parameters: {use_sim_time: true}}", r"only '/\*\*'"),
@@ -87,8 +87,8 @@ def test_a_section_may_be_empty(read):
         (b"a: 1 \n" * (MAX_PARAMETER_BYTES // 6 + 1), "at most 131072 bytes"),
     ],
 )
-def test_invalid_files_are_rejected_with_the_reason(read, text, says):
-    with pytest.raises(InputError, match=says) as caught:
+def test_invalid_files_are_rejected_with_the_reason(read, text, message):
+    with pytest.raises(InputError, match=message) as caught:
         read(text)
     assert "params.yaml" in str(caught.value)
 

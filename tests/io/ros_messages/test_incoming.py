@@ -112,7 +112,7 @@ def test_a_better_stamp_can_be_given() -> None:
 @pytest.mark.parametrize(
     "changes", [{"ranges": []}, {"angle_increment": 0.0}, {"range_max": 0.0}, {"ranges": [None]}]
 )
-def test_what_is_no_scan_is_a_scan_error(changes: dict[str, Any]) -> None:
+def test_an_invalid_scan_is_a_scan_error(changes: dict[str, Any]) -> None:
     with pytest.raises(ScanError):
         convert(scan_message(**changes))
 
@@ -127,7 +127,7 @@ def test_a_transform_is_projected_onto_the_floor(yaw: float) -> None:
     assert_allclose(to_planar(transform).as_array(), [1.0, 2.0, yaw], atol=1e-12)
 
 
-def test_turned_over_about_its_x_axis_it_still_looks_the_same_way() -> None:
+def test_a_sensor_turned_over_about_its_x_axis_keeps_its_heading() -> None:
     yaw = 0.7  # Rz(yaw) Rx(π)
     q = (math.cos(yaw / 2), math.sin(yaw / 2), 0.0, 0.0)
     assert to_planar(to_transform(transform_message(q))).yaw == pytest.approx(yaw)
@@ -136,7 +136,7 @@ def test_turned_over_about_its_x_axis_it_still_looks_the_same_way() -> None:
 @pytest.mark.parametrize(
     "q", [(0.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0), (0, 0, math.inf, 0)]
 )
-def test_a_rotation_that_is_not_known_is_never_the_identity(q: tuple[float, ...]) -> None:
+def test_an_unknown_rotation_is_never_the_identity(q: tuple[float, ...]) -> None:
     with pytest.raises(ScanError, match="finite numbers from base_link to laser"):
         to_planar(to_transform(transform_message(q)))
 
@@ -197,7 +197,7 @@ def test_the_origin_of_a_map_may_be_turned() -> None:
     assert_allclose(turned.T_map_grid.as_array(), [1.0, 2.0, 0.7])
 
 
-def test_a_map_that_does_not_say_how_it_is_turned_is_not() -> None:
+def test_a_map_without_a_rotation_is_not_turned() -> None:
     """octomap_server leaves all four numbers at zero, and AMCL does not look at them."""
     assert to_grid(map_message(orientation=(0, 0, 0, 0))).T_map_grid.yaw == 0.0
 
@@ -233,7 +233,7 @@ def test_a_map_that_does_not_say_how_it_is_turned_is_not() -> None:
         ({"orientation": (1e308, 1e308, 1e308, 1e308)}, "rotation"),
     ],
 )
-def test_what_is_no_map_is_a_map_error(changes: dict[str, Any], words: str) -> None:
+def test_an_invalid_map_is_a_map_error(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(MapError, match=words):
         to_grid(map_message(**changes))
 
@@ -245,19 +245,19 @@ def test_a_pose_has_a_frame_and_a_stamp() -> None:
     message = transform_message((0.0, 0.0, 1.0, 0.0), parent="/map")
     place = message.transform
     pose = Message(position=place.translation, orientation=place.rotation)
-    said = to_pose(Message(header=message.header, pose=Message(pose=pose)))
-    assert (said.parent, said.child, said.stamp) == ("map", "", 10.5)
-    assert_allclose(to_planar(said).as_array(), [1.0, 2.0, math.pi])
+    received = to_pose(Message(header=message.header, pose=Message(pose=pose)))
+    assert (received.parent, received.child, received.stamp) == ("map", "", 10.5)
+    assert_allclose(to_planar(received).as_array(), [1.0, 2.0, math.pi])
 
 
 @pytest.mark.parametrize("field", ["sensor", "wheel", "bumper"])
 @pytest.mark.parametrize("state", [0, 1])
-def test_events_of_a_kobuki_tell_which_and_whether(field: str, state: int) -> None:
+def test_events_of_a_kobuki_have_a_kind_and_a_state(field: str, state: int) -> None:
     assert to_pressed(Message(**{field: 1, "state": state, "bottom": 9})) == (1, bool(state))
 
 
 @pytest.mark.parametrize("data", [True, False, np.True_, np.False_])
-def test_a_bool_tells_whether(data: Any) -> None:
+def test_a_bool_is_a_state(data: Any) -> None:
     assert to_pressed(Message(data=data)) == (0, bool(data))
 
 
@@ -304,7 +304,7 @@ def test_a_transform_is_a_pose_of_finite_numbers_or_an_error(
         dict.fromkeys(("angle_min", "angle_increment", "range_min", "range_max"), NUMBERS)
     ),
 )
-def test_a_scan_is_one_or_a_scan_error(ranges: list[float], numbers: dict[str, float]) -> None:
+def test_any_scan_is_valid_or_a_scan_error(ranges: list[float], numbers: dict[str, float]) -> None:
     try:
         scan = convert(scan_message(ranges=ranges, **numbers))
     except ScanError:
@@ -323,7 +323,7 @@ def test_a_scan_is_one_or_a_scan_error(ranges: list[float], numbers: dict[str, f
     position=POSITIONS | st.just((0.0, 0.0, 0.0)),
     orientation=QUATERNIONS | st.just((0.0, 0.0, 0.0, 1.0)),
 )
-def test_a_map_is_one_or_a_map_error(**fields: Any) -> None:
+def test_any_map_is_valid_or_a_map_error(**fields: Any) -> None:
     try:
         grid = to_grid(map_message(**fields))
     except MapError:

@@ -63,28 +63,28 @@ def assert_same_pose(a: SE2, b: SE2) -> None:
 def test_a_stamp_comes_back_to_the_last_bit_or_to_half_a_nanosecond(stamp):
     back = to_seconds(header(plain, stamp, "map").stamp)
     assert abs(back - stamp) <= max(0.5e-9, math.ulp(stamp) / 2)
-    if stamp > 2**24:  # where half a nanosecond is less than float64 can tell
+    if stamp > 2**24:  # half a nanosecond is below the resolution of float64
         assert back == stamp
 
 
 @given(st.integers(0, 2**31 - 1), st.integers(0, 999_999_999))
-def test_what_was_heard_is_said_as_near_as_float64_allows(sec, nanosec):
-    """So that an answer is found beside its scan: 0.2 µs today."""
-    said = header(plain, to_seconds(SimpleNamespace(sec=sec, nanosec=nanosec)), "map").stamp
-    off_ns = (said.sec - sec) * 1_000_000_000 + said.nanosec - nanosec
+def test_a_stamp_is_sent_as_exactly_as_float64_allows(sec, nanosec):
+    """0.2 µs today: results can be matched to their scans."""
+    stamp_sent = header(plain, to_seconds(SimpleNamespace(sec=sec, nanosec=nanosec)), "map").stamp
+    off_ns = (stamp_sent.sec - sec) * 1_000_000_000 + stamp_sent.nanosec - nanosec
     assert abs(off_ns) <= 1 + 1e9 * math.ulp(float(sec + 1)) / 2
-    assert 0 <= said.nanosec < 1_000_000_000
+    assert 0 <= stamp_sent.nanosec < 1_000_000_000
 
 
-def test_a_second_that_is_nearly_over_is_over():
+def test_a_stamp_just_below_a_second_is_rounded_up():
     stamp = header(plain, 9.9999999999, "map").stamp
     assert (stamp.sec, stamp.nanosec) == (10, 0)
 
 
 @pytest.mark.parametrize("stamp", [-1e-12, -0.5, -1.0, -1e12])
-def test_before_the_epoch_is_the_epoch(stamp):
-    said = header(plain, stamp, "map").stamp
-    assert (said.sec, said.nanosec) == (0, 0)
+def test_stamps_before_the_epoch_become_the_epoch(stamp):
+    stamp_sent = header(plain, stamp, "map").stamp
+    assert (stamp_sent.sec, stamp_sent.nanosec) == (0, 0)
 
 
 def test_a_header_names_its_frame(wire):
@@ -100,10 +100,10 @@ def test_a_header_names_its_frame(wire):
 @given(POSES, STAMPS)
 def test_a_pose_comes_back(wire, T_map_base, stamp):
     message = wire.sent(pose_with_covariance(wire.make, stamp, "map", T_map_base, np.eye(3)))
-    heard = to_pose(message)
-    assert (heard.parent, heard.child) == ("map", "")
-    assert heard.stamp == to_seconds(header(plain, stamp, "").stamp)
-    assert_same_pose(to_planar(heard), T_map_base)
+    received = to_pose(message)
+    assert (received.parent, received.child) == ("map", "")
+    assert received.stamp == to_seconds(header(plain, stamp, "").stamp)
+    assert_same_pose(to_planar(received), T_map_base)
 
 
 def test_a_covariance_has_x_y_and_yaw_where_ros_has_them(wire):
@@ -121,8 +121,8 @@ def test_poses_keep_their_order(wire, poses):
     message = wire.sent(pose_array(wire.make, NOW, "map", poses))
     assert message.header.frame_id == "map"
     assert [(p.position.x, p.position.y) for p in message.poses] == [(T.x, T.y) for T in poses]
-    for heard, T in zip(message.poses, poses, strict=True):
-        q = heard.orientation
+    for received, T in zip(message.poses, poses, strict=True):
+        q = received.orientation
         assert math.hypot(q.x, q.y, q.z, q.w) == pytest.approx(1.0)
         assert angle_error(2.0 * math.atan2(q.z, q.w), T.yaw) < 1e-12
 
@@ -141,18 +141,20 @@ def test_particles_have_poses_and_weights(wire):
 @over_the_wire
 @given(POSES)
 def test_a_transform_comes_back(wire, T):
-    (heard,) = map(to_transform, wire.sent(transforms(wire.make, 5.5, "map", "odom", T)).transforms)
-    assert (heard.parent, heard.child, heard.stamp) == ("map", "odom", 5.5)
-    assert heard.translation[2] == 0.0
-    assert_same_pose(to_planar(heard), T)
+    (received,) = map(
+        to_transform, wire.sent(transforms(wire.make, 5.5, "map", "odom", T)).transforms
+    )
+    assert (received.parent, received.child, received.stamp) == ("map", "odom", 5.5)
+    assert received.translation[2] == 0.0
+    assert_same_pose(to_planar(received), T)
 
 
 @over_the_wire
 @given(POSES)
 def test_odometry_comes_back(wire, T):
-    heard = to_odometry(wire.sent(odometry(wire.make, 5.5, "odom", "base_footprint", T)))
-    assert (heard.parent, heard.child, heard.stamp) == ("odom", "base_footprint", 5.5)
-    assert_same_pose(to_planar(heard), T)
+    received = to_odometry(wire.sent(odometry(wire.make, 5.5, "odom", "base_footprint", T)))
+    assert (received.parent, received.child, received.stamp) == ("odom", "base_footprint", 5.5)
+    assert_same_pose(to_planar(received), T)
 
 
 # ---- scans
@@ -188,7 +190,7 @@ def test_a_scan_comes_back(wire, ranges, angle_min, increment, sign):
     assert_allclose([back.range_min, back.range_max], [0.1, 8.0], rtol=1e-7)
 
 
-def test_the_last_beam_is_where_ros_says_it_is(wire):
+def test_the_last_beam_has_the_bearing_of_ros(wire):
     message = wire.sent(laser_scan(wire.make, "laser", scan_of([1.0] * 11)))
     assert message.angle_max == pytest.approx(0.0, abs=1e-6)
     assert len(message.ranges) == 11
@@ -224,13 +226,13 @@ def test_a_map_comes_back(wire, resolution, T_map_grid):
 
 
 @pytest.mark.parametrize("resolution", [0.01, 0.02, 0.025, 0.05, 0.1, 1.0])
-def test_the_side_of_a_cell_is_what_was_meant(wire, resolution):
+def test_the_resolution_survives_float32(wire, resolution):
     """0.05 travels as 0.05000000074505806, which is 6 µm in a building of 400 m."""
     message = wire.sent(occupancy_grid(wire.make, NOW, "map", plan(resolution)))
     assert to_grid(message).resolution == resolution
 
 
-def test_what_nobody_has_seen_is_unknown_to_others(wire):
+def test_unseen_cells_are_sent_as_unknown(wire):
     unseen = np.zeros(CELLS.shape, np.bool_)
     unseen[0, 0] = True
     sent = wire.sent(occupancy_grid(wire.make, NOW, "map", plan(unseen=unseen)))
@@ -258,7 +260,7 @@ def test_a_map_of_other_clients_is_the_same(wire):
 # ---- status
 
 
-def test_a_status_says_how_grave_and_what(wire):
+def test_a_status_has_a_level_and_a_message(wire):
     values = {"state": "DISAMBIGUATING", "beams": "120"}
     message = diagnostics(wire.make, NOW, "firstfix", Level.WARN, "two places fit", values)
     sent = wire.sent(message)

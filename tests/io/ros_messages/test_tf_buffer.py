@@ -1,4 +1,4 @@
-"""What a node knows of its frames: laws, scipy for what lies between, and every way not to know."""
+"""Transforms at a stamp: laws, interpolation compared with scipy, and every lookup failure."""
 
 import math
 
@@ -101,7 +101,7 @@ def test_a_quaternion_and_its_negative_are_one_rotation(q, s, share):
     assert_allclose(T, other, atol=1e-9)
 
 
-def test_hardly_turned_is_still_a_rotation():
+def test_a_tiny_rotation_is_interpolated():
     """Where the sine of the angle is rounding."""
     tiny = (0.0, 0.0, 1e-9, 1.0)
     buffer = buffer_of([link("odom", "base", 1.0), link("odom", "base", 2.0, q=tiny)])
@@ -139,7 +139,7 @@ def test_the_newest_of_a_chain_is_that_of_its_slowest_link():
     assert buffer.links("odom", "laser") == ("laser", "base", "mid")
 
 
-def test_what_is_fixed_holds_at_all_times():
+def test_static_transforms_hold_at_all_times():
     buffer = buffer_of(fixed=[link("base", "laser", 5.0, (1.0, 0.0, 0.0))])
     assert [x_at(buffer, t, "base", "laser") for t in (-1e9, 0.0, 5.0, 1e12)] == [1.0] * 4
     buffer.add_static(link("base", "laser", 1.0, (2.0, 0.0, 0.0)))
@@ -153,13 +153,13 @@ def test_memory_is_bounded_by_time():
     assert isinstance(buffer.at("odom", "base", 59.9 - KEPT_S - 1.0), LookupFailure)
 
 
-def test_what_comes_later_than_all_that_is_kept_changes_nothing():
+def test_transforms_older_than_the_buffer_change_nothing():
     buffer = buffer_of(along("odom", "base", 100.0, 101.0, 1.0))
     assert isinstance(buffer.at("odom", "base", 50.0), LookupFailure)
     assert x_at(buffer, 100.5) == pytest.approx(100.5)
 
 
-def test_a_clock_set_back_forgets_what_moved():
+def test_a_clock_set_back_discards_moving_frames():
     buffer = buffer_of(along("odom", "base", 100.0), [link("base", "laser")])
     buffer.discard_moving()
     assert buffer.frames == ("base", "laser")
@@ -167,10 +167,10 @@ def test_a_clock_set_back_forgets_what_moved():
     assert x_at(buffer, 1.0) == 7.0
 
 
-# ---- not known
+# ---- lookup failures
 
 
-def test_of_an_empty_buffer_nothing_is_known():
+def test_an_empty_buffer_has_no_frame():
     answer = TransformBuffer().at("odom", "base", 1.0)
     assert why(answer) == "no transform has the frame odom and base; known frames: none"
     assert not answer.later
@@ -178,20 +178,20 @@ def test_of_an_empty_buffer_nothing_is_known():
     assert isinstance(TransformBuffer().links("odom", "base"), LookupFailure)
 
 
-def test_a_frame_that_nobody_tells_of_is_named_beside_those_that_there_are():
+def test_an_unknown_frame_is_named_with_the_known_ones():
     buffer = buffer_of(along("odom", "base_link", 1.0))
     answer = buffer.at("odom", "base_footprint", 1.0)
     assert why(answer) == "no transform has the frame base_footprint; known frames: base_link, odom"
 
 
-def test_trees_that_do_not_meet_are_told_apart():
+def test_separate_trees_are_named():
     buffer = buffer_of(along("odom", "base", 1.0), [link("mast", "laser")])
     assert why(buffer.at("base", "laser", 1.0)) == (
         "no transforms join base (below odom) and laser (below mast)"
     )
 
 
-def test_what_is_too_new_will_be_known_later_and_what_is_too_old_never():
+def test_a_lookup_ahead_may_succeed_later_and_one_too_old_never():
     buffer = buffer_of(along("odom", "base", 1.0, 2.0))
     later, never = buffer.at("odom", "base", 2.5), buffer.at("odom", "base", 0.25)
     assert why(later) == "the transform from odom to base is 0.500 s older than the scan"
@@ -228,7 +228,7 @@ def test_the_newest_parent_of_a_frame_counts():
         {"q": (math.nan,) * 4},
     ],
 )
-def test_what_is_no_number_is_left_out(changes):
+def test_transforms_that_are_not_finite_are_ignored(changes):
     bad = link("odom", "base", **({"stamp": 1.0} | changes))
     buffer = buffer_of([bad], [bad])
     assert buffer.frames == ()
@@ -248,7 +248,7 @@ ANYTHING = st.builds(
 
 
 @given(st.lists(st.tuples(ANYTHING, st.booleans()), max_size=15), NAMES, NAMES, st.floats())
-def test_whatever_comes_the_answer_is_finite_or_a_reason(messages, target, source, stamp):
+def test_any_lookup_is_finite_or_has_a_reason(messages, target, source, stamp):
     buffer = TransformBuffer()
     for message, fixed in messages:
         (buffer.add_static if fixed else buffer.add)(message)
