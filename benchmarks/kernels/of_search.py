@@ -204,6 +204,7 @@ def _descend_field(found: NDArray[np.float64], beams: Beams, fields: MapFields) 
 def _descend_rays(best: NDArray[np.float64], beams: Beams, fields: MapFields) -> Kernel:
     hits, resolution = beams.hits().thinned(refine.RAY_BEAMS), fields.grid.resolution
     cosines, sines, ranges = np.cos(hits.bearings), np.sin(hits.bearings), hits.ranges / resolution
+    starts = hits.starts / resolution
     beyond = refine._RAY_GATE_M / resolution + refine._BEYOND_GATE_CELLS
     information, variances = np.empty((len(best), 4, 4)), np.empty(len(best))
 
@@ -212,6 +213,7 @@ def _descend_rays(best: NDArray[np.float64], beams: Beams, fields: MapFields) ->
             best.copy(),
             information,
             variances,
+            starts,
             cosines,
             sines,
             ranges,
@@ -233,15 +235,15 @@ def _descend_rays(best: NDArray[np.float64], beams: Beams, fields: MapFields) ->
         units=float(rounds * len(hits)),
         call=call,
         working_set=(2.0 * mean_cells) ** 2,
-        moved=24 + leaps + 24,
-        operations=LEAP_OPERATIONS * leaps + 85,
+        moved=40 + leaps + 24,
+        operations=LEAP_OPERATIONS * leaps + 97,
         roofs=leap_roofs(
             mean_cells,
             leaps,
             (limits.calls("exp"), 1),
             (limits.calls("division"), 5),
             (limits.calls("sqrt"), 1),
-            (limits.operations("f64"), 85),
+            (limits.operations("f64"), 97),
         ),
     )
 
@@ -268,8 +270,8 @@ def _verify(refined: NDArray[np.float64], beams: Beams, fields: MapFields) -> Ke
         units=float(len(refined) * len(used)),
         call=lambda: verify._compared(refined, used, fields),
         working_set=(2.0 * mean_cells) ** 2,
-        moved=41 + leaps + 7,
-        operations=LEAP_OPERATIONS * leaps + 26,
+        moved=57 + leaps + 7,
+        operations=LEAP_OPERATIONS * leaps + 34,
         roofs=leap_roofs(mean_cells, leaps, (limits.calls("exp"), 1), (limits.calls("log"), 1)),
     )
 

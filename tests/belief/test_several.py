@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from firstfix.belief.at_rest import longest_consistent
+from firstfix.belief.belief import begin, update
 from firstfix.belief.several import check_sequence, distinct_views, locate_several
+from firstfix.belief.view import View
 from firstfix.core.angles import angle_error
 from firstfix.core.errors import InputError
 from firstfix.core.estimate import Verdict
@@ -168,3 +170,17 @@ def test_scans_that_do_not_belong_together_are_refused(stamps, x, word):
     scans = [replace(scan_of(1.0), stamp=stamp) for stamp in stamps]
     with pytest.raises(InputError, match=word):
         check_sequence(scans, [SE2(far, 0.0, 0.0) for far in x])
+
+
+# --- several sensors ---
+
+
+def test_a_view_of_two_sensors_does_not_depend_on_their_order(room):
+    rng, truth = np.random.default_rng(1), SE2(5.5, 4.5, 0.4)
+    front = Lidar(beams=91, fov=math.pi, T_base_laser=SE2(0.3, 0.2, 0.8))
+    rear = replace(front, T_base_laser=SE2(-0.3, -0.2, -2.3))
+    scans = tuple(lidar.scan(room.grid, truth, rng) for lidar in (front, rear))
+    one, other = (update(begin(room), View(order, REST)) for order in (scans, scans[::-1]))
+    assert one.places[0].pose.distance_to(truth) < 0.05
+    np.testing.assert_array_equal(one.poses, other.poses)
+    np.testing.assert_array_equal(one.probabilities, other.probabilities)

@@ -92,3 +92,15 @@ def test_a_list_of_scans_becomes_a_tuple_and_other_things_are_refused() -> None:
     assert Recording([SCAN]).scans == (SCAN,)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"scans as a LaserScan, received ndarray"):
         Recording(np.ones((2, 3)))  # type: ignore[arg-type]
+
+
+def test_scans_of_two_sensors_are_put_together_by_time():
+    at = [(0.0, 0), (0.04, 1), (0.1, 0), (0.14, 1), (0.2, 0), (0.9, 0)]
+    scans = tuple(LaserScan(np.ones(3), 0.0, 0.1, 0.1, 5.0, stamp=stamp) for stamp, _ in at)
+    recording = Recording(scans, sensors=np.array([sensor for _, sensor in at]))
+    assert recording.instants() == [(0, 1), (2, 3), (4, 3), (5,)]
+
+
+def test_scans_of_one_sensor_stand_alone():
+    scans = tuple(LaserScan(np.ones(3), 0.0, 0.1, 0.1, 5.0, stamp=float(i)) for i in range(2))
+    assert Recording(scans).instants() == [(0,), (1,)]

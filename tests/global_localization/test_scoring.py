@@ -228,7 +228,7 @@ def test_classes_of_beams_have_the_shares_of_the_evidence(hall, n):
     (pose,) = drawn(hall, 1)
     scan = seen(hall, pose, Lidar(beams=n, range_max=4.0))
     (judged,) = score_poses(scan, [pose], hall)
-    beams, e = classify_beams(scan, judged.pose, hall), judged.evidence
+    beams, e = classify_beams([scan], judged.pose, hall), judged.evidence
     assert len(beams.classes) == len(beams.ends) == len(beams.hit) == e.beams <= BEAMS
     shares = [beams.share(kind) for kind in BeamClass]
     assert shares == [e.explained, e.short, e.through_wall, e.unknown]
@@ -237,7 +237,7 @@ def test_classes_of_beams_have_the_shares_of_the_evidence(hall, n):
 def test_hits_end_at_the_points_of_the_scan(hall):
     (pose,) = drawn(hall, 1)
     scan = seen(hall, pose)
-    beams = classify_beams(scan, pose, hall)
+    beams = classify_beams([scan], pose, hall)
     points = pose.apply(scan.points())
     for end in beams.ends[beams.hit]:
         assert np.hypot(*(points - end).T).min() < 1e-6

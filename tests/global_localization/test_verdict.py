@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from firstfix.core.estimate import Evidence, Verdict
-from firstfix.core.scan import LaserScan
 from firstfix.global_localization.verdict import (
     count_rivals,
     judge,
@@ -134,8 +133,7 @@ def test_fewer_beams_are_less_sure():
 
 @given(st.integers(0, 30), st.integers(0, 7), st.integers(1, 8))
 def test_a_scan_with_too_few_hits_is_answered_with_their_number(n, hits, needed):
-    scan = LaserScan(np.full(n + 1, np.nan, np.float32), 0.0, 0.1, 0.1, 5.0)
-    result = nothing_to_match(scan, hits, needed, 0.25)
+    result = nothing_to_match(n + 1, hits, needed, 0.25)
     assert result.verdict is Verdict.NO_MATCH
     assert f"only {hits} of {n + 1} beams" in result.reason
     assert f"{needed} are needed" in result.reason

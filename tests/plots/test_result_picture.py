@@ -16,7 +16,7 @@ from firstfix.plots import figure
 def result(hall_plan: ff.OccupancyGrid) -> ff.LocateResult:
     scan = ff.Lidar(beams=180).scan(hall_plan, ff.SE2(3.0, 2.0, 0.5), np.random.default_rng(0))
     found = ff.ScanMatcher(hall_plan).locate(scan)
-    assert (found.grid, found.scan) == (hall_plan, scan)
+    assert (found.grid, found.scans) == (hall_plan, (scan,))
     return found
 
 

@@ -79,16 +79,17 @@ def adjust(
     ndarray, shape (n, 3)
         The adjusted poses.
     """
-    sensor = seen.sensors[0]
+    sensor = seen.sensor
     hits = sensor.beams.hits().thinned(_BEAMS)
     resolution = fields.grid.resolution
     poses = compose(predicted, sensor.T_base_laser)
+    ends_x, ends_y = np.ascontiguousarray(hits.ends.T / resolution)
     witness = _BEAMS_PER_WITNESS * (_BEAM_SIGMA_M / resolution) ** 2 * len(hits) / _BEAMS
     sigmas = np.geomspace(_FIRST_SIGMA_M, max(_LAST_SIGMA_M, resolution), _ROUNDS)
     _descend(
         poses,
-        hits.ranges / resolution * np.cos(hits.bearings),
-        hits.ranges / resolution * np.sin(hits.bearings),
+        ends_x,
+        ends_y,
         fields.squares,
         fields.distances,
         sigmas / resolution,

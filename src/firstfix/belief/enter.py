@@ -56,7 +56,7 @@ def propose(
         What was searched.
     """
     seen = window[-1]
-    sensor = seen.sensors[0]
+    sensor = seen.sensor
     most = config.first_shortlist if len(window) == 1 else config.shortlist
     depth = most * _DEEPER if hints else most
     candidates, report = search(sensor.beams, fields, depth, _ALL_POSES)

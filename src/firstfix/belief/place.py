@@ -52,7 +52,7 @@ def listed_places(
     n = min(len(tracks), _MOST_LISTED, max(_LEAST_LISTED, worth))
     if n == 0:
         return ()
-    sensor = seen.sensors[0]
+    sensor = seen.sensor
     lasers = compose(tracks.now[:n], sensor.T_base_laser)
     _, covariances = refine_on_rays(lasers, sensor.beams, fields)
     verification = verify(lasers, sensor.beams, fields)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 from firstfix.belief.at_rest import longest_consistent
 from firstfix.belief.belief import REST_M, REST_RAD, Belief, begin, brings_news, update
@@ -16,6 +17,7 @@ from firstfix.core.estimate import LocateResult
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.sensors import at_one_time, instants
 
 # No robot in a building is faster; and a way this long between two scans hides what lies between.
 FASTEST_M_S = 5.0
@@ -60,7 +62,8 @@ def locate_several(
     for view in distinct_views(scans, T_odom_base):
         if brings_news(belief, view.T_odom_base) or view.T_odom_base is T_odom_base[-1]:
             belief = update(belief, view)
-    return as_result(belief, time.perf_counter() - started)
+    seen = belief.window[-1].scans if belief.window else tuple(scans[-1:])
+    return replace(as_result(belief, time.perf_counter() - started), scans=seen)
 
 
 def as_result(belief: Belief, elapsed_s: float) -> LocateResult:
@@ -75,12 +78,12 @@ def as_result(belief: Belief, elapsed_s: float) -> LocateResult:
 
 
 def distinct_views(scans: Sequence[LaserScan], T_odom_base: Sequence[SE2]) -> list[View]:
-    """Combine scans that follow each other at rest; the others are views of their own.
+    """Make a view of each instant, and combine views that follow each other at rest.
 
     Parameters
     ----------
     scans : sequence of LaserScan
-        Oldest first.
+        Oldest first; of one sensor or several.
     T_odom_base : sequence of SE2
         Odometry at each scan.
 
@@ -89,14 +92,19 @@ def distinct_views(scans: Sequence[LaserScan], T_odom_base: Sequence[SE2]) -> li
     list of View
         With the odometry of the last scan at each place.
     """
-    groups: list[list[int]] = []
-    for i, pose in enumerate(T_odom_base):
-        if groups and _rests(T_odom_base[groups[-1][0]], pose) and _alike(scans[i - 1], scans[i]):
-            groups[-1].append(i)
+    groups: list[list[View]] = []
+    for index in instants(scans):
+        poses = [T_odom_base[i] for i in index]
+        view = View(at_one_time([scans[i] for i in index], poses), poses[-1])
+        if groups and _rests(groups[-1][0], view) and _alike(groups[-1][-1], view):
+            groups[-1].append(view)
         else:
-            groups.append([i])
+            groups.append([view])
     return [
-        View.of(longest_consistent([scans[i] for i in group]), T_odom_base[group[-1]])
+        View(
+            tuple(map(longest_consistent, zip(*(view.scans for view in group), strict=True))),
+            group[-1].T_odom_base,
+        )
         for group in groups
     ]
 
@@ -127,10 +135,14 @@ def check_sequence(scans: Sequence[LaserScan], T_odom_base: Sequence[SE2]) -> No
             )
 
 
-def _rests(start: SE2, end: SE2) -> bool:
-    step = start.inverse() @ end
+def _rests(start: View, end: View) -> bool:
+    step = start.T_odom_base.inverse() @ end.T_odom_base
     return math.hypot(step.x, step.y) <= REST_M and abs(step.yaw) <= REST_RAD
 
 
-def _alike(a: LaserScan, b: LaserScan) -> bool:
-    return (len(a), a.angle_min, a.angle_increment) == (len(b), b.angle_min, b.angle_increment)
+def _alike(a: View, b: View) -> bool:
+    return [_beams_of(scan) for scan in a.scans] == [_beams_of(scan) for scan in b.scans]
+
+
+def _beams_of(scan: LaserScan) -> tuple[float, ...]:
+    return len(scan), scan.angle_min, scan.angle_increment

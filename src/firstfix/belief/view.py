@@ -15,8 +15,9 @@ from firstfix.core.errors import InputError
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
-from firstfix.global_localization.beams import LONGEST_M, Beams, usable_beams
+from firstfix.global_localization.beams import LONGEST_M, Beams
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
+from firstfix.global_localization.sensors import joint_beams
 from firstfix.global_localization.verify import verify
 
 # More scans at rest add nothing: what moves has moved.
@@ -63,7 +64,7 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Sensor:
-    """A scan, its beams, and the pose of the sensor on the robot in cells, shape (3,)."""
+    """All beams of a view in the frame of one sensor, and its pose in cells, shape (3,)."""
 
     scan: LaserScan
     beams: Beams
@@ -94,18 +95,15 @@ class Observation:
         )
 
     @cached_property
-    def sensors(self) -> tuple[Sensor, ...]:
-        """The beams of each sensor, the one with most hits first."""
-        sensors = [
-            Sensor(scan, usable_beams(scan), in_cells(scan.T_base_laser, self.resolution))
-            for scan in self.scans
-        ]
-        return tuple(sorted(sensors, key=_rank))
+    def sensor(self) -> Sensor:
+        """The beams of all sensors, in the frame of the one with most hits."""
+        scan, beams = joint_beams(self.scans)
+        return Sensor(scan, beams, in_cells(scan.T_base_laser, self.resolution))
 
     @property
     def beams(self) -> Beams:
-        """The beams of the sensor with most hits."""
-        return self.sensors[0].beams
+        """The beams of all sensors."""
+        return self.sensor.beams
 
     @cached_property
     def odometry(self) -> NDArray[np.float64]:
@@ -115,7 +113,7 @@ class Observation:
     @cached_property
     def hits(self) -> int:
         """Number of beams on surfaces."""
-        return sum(int(np.count_nonzero(sensor.beams.hit)) for sensor in self.sensors)
+        return int(np.count_nonzero(self.beams.hit))
 
     @cached_property
     def field_of_view(self) -> float:
@@ -156,23 +154,17 @@ def costs(
     seen : Observation
         What was seen.
     beams : int
-        Number of beams of each sensor to compare.
+        Number of beams to compare.
     fields : MapFields
         The prepared map.
     """
-    total, weight = np.zeros(len(poses)), 0
-    for sensor in seen.sensors:
-        used = sensor.beams.thinned(beams)
-        if len(used) > 0:
-            scores = verify(compose(poses, sensor.T_base_laser), used, fields).scores
-            total += len(used) * scores
-            weight += len(used)
-    return total / max(1, weight)
+    sensor = seen.sensor
+    return verify(compose(poses, sensor.T_base_laser), sensor.beams.thinned(beams), fields).scores
 
 
 def settle(poses: NDArray[np.float64], seen: Observation, fields: MapFields) -> NDArray[np.float64]:
-    """Move poses of the base, shape (n, 3), to where the widest scan lies on walls."""
-    sensor = seen.sensors[0]
+    """Move poses of the base, shape (n, 3), to where the end points lie on walls."""
+    sensor = seen.sensor
     settled = refine_on_field(compose(poses, sensor.T_base_laser), sensor.beams, fields)
     return compose(settled, inverse(sensor.T_base_laser))
 
@@ -181,7 +173,7 @@ def settle_on_rays(
     poses: NDArray[np.float64], seen: Observation, fields: MapFields
 ) -> NDArray[np.float64]:
     """Move poses of the base, shape (n, 3), to where measured and cast ranges agree."""
-    sensor = seen.sensors[0]
+    sensor = seen.sensor
     settled, _ = refine_on_rays(compose(poses, sensor.T_base_laser), sensor.beams, fields)
     return compose(settled, inverse(sensor.T_base_laser))
 
@@ -190,11 +182,6 @@ def motion(start: Observation, end: Observation) -> tuple[float, float]:
     """Return the distance (cells) and the turn (rad, never negative) between two observations."""
     step = between(start.odometry, end.odometry)
     return math.hypot(step[0], step[1]), abs(math.remainder(step[2], 2.0 * math.pi))
-
-
-def _rank(sensor: Sensor) -> tuple[int, list[float]]:
-    """Most hits first; of equal ones in an order that does not depend on that of the scans."""
-    return -int(np.count_nonzero(sensor.beams.hit)), sensor.T_base_laser.tolist()
 
 
 def _angle(scan: LaserScan) -> float:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from firstfix.cli.progress import progress, working
+from firstfix.cli.sensor_options import BaseFrame, LaserFrame, LaserPose, Topics, read_log
 from firstfix.core.errors import InputError, ScanError
 from firstfix.global_localization.config import Method
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from firstfix.core.estimate import Hypothesis, LocateResult
     from firstfix.core.recording import Recording
     from firstfix.core.se2 import SE2
+    from firstfix.global_localization.scan_matcher import ScanMatcher
 
 NO_ANSWER = 1
 
@@ -41,24 +43,30 @@ def locate(
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw the answer: .png, .svg or .pdf.")
     ] = None,
-    topic: Annotated[
-        str | None, typer.Option(help="Scan topic of a bag, where it has several.")
-    ] = None,
+    topic: Topics = None,
+    laser_pose: LaserPose = None,
+    base_frame: BaseFrame = None,
+    laser_frame: LaserFrame = None,
 ) -> None:
     """Find the pose at which a scan was taken, anywhere in the map.
 
-    One scan (not --all) ends with exit status 0 if its place is UNIQUE and 1 if it is not.
+    With several --topic, the scans that the sensors took together count together, and --index
+    counts the scans of the first topic. One scan (not --all) ends with exit status 0 if its place
+    is UNIQUE and 1 if it is not.
     """
     _check_options(index, every, plot)
     from firstfix.core.estimate import Verdict
-    from firstfix.io.logs.load import load_recording
     from firstfix.io.maps.map_server import load_map
     from firstfix.lab.experiments.case import truth_at
 
     grid = load_map(map_path)
     first = index or 0
-    recording = load_recording(scans, topic=topic, max_scans=None if every else first + 1)
-    chosen = range(len(recording)) if every else _only(recording, first)
+    # The scan of another sensor that is nearest in time may come later.
+    several = topic is not None and len(topic) > 1
+    limit = None if every or several else first + 1
+    recording = read_log(scans, topic, laser_pose, base_frame, laser_frame, limit)
+    instants = recording.instants()
+    chosen = range(len(instants)) if every else _only(len(instants), first)
     for note in recording.notes:
         typer.echo(f"note: {note}", err=True)
 
@@ -71,8 +79,8 @@ def locate(
     # On a terminal the answers themselves show how far it is.
     with progress(0 if sys.stdout.isatty() else len(chosen), "locating") as done:
         for i in chosen:
-            truth = truth_at(recording, i)
-            result = matcher.locate(recording.scans[i])
+            truth = truth_at(recording, instants[i][0])
+            result = _located(matcher, recording, instants[i])
             if as_lines:
                 typer.echo(json.dumps(result.to_dict(i, truth), allow_nan=False))
             else:
@@ -81,9 +89,7 @@ def locate(
     if plot is not None:
         from firstfix.plots.result_picture import draw_result
 
-        typer.echo(
-            f"picture: {draw_result(grid, recording.scans[i], result, plot, truth)}", err=True
-        )
+        typer.echo(f"picture: {draw_result(grid, result.scans, result, plot, truth)}", err=True)
     if not every and result.verdict is not Verdict.UNIQUE:
         raise typer.Exit(NO_ANSWER)
 
@@ -101,11 +107,20 @@ def _check_options(index: int | None, every: bool, plot: Path | None) -> None:
         check_picture(plot)
 
 
-def _only(recording: Recording, index: int) -> range:
-    if index >= len(recording):
+def _located(matcher: ScanMatcher, recording: Recording, instant: tuple[int, ...]) -> LocateResult:
+    """Locate the scans of one instant together, moved to one time by odometry where it is known."""
+    scans, odometry = [recording.scans[i] for i in instant], recording.odometry
+    if len(scans) == 1 or odometry is None:
+        return matcher.locate(scans)
+    poses = [pose for scan in scans if (pose := odometry.at(scan.stamp)) is not None]
+    return matcher.locate(scans, T_odom_base=poses if len(poses) == len(scans) else None)
+
+
+def _only(count: int, index: int) -> range:
+    if index >= count:
         raise ScanError(
             expected=f"a log with a scan of index {index}",
-            received=f"{len(recording)} scans, 0 to {len(recording) - 1}",
+            received=f"{count} scans, 0 to {count - 1}",
             remedy="choose a smaller --index",
         )
     return range(index, index + 1)

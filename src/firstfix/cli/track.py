@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from firstfix.cli.progress import progress
+from firstfix.cli.sensor_options import BaseFrame, LaserFrame, LaserPose, Topics, read_log
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -49,9 +50,10 @@ def track(
         Path | None,
         typer.Option(metavar="FILE", help="Draw track and scans on the map: .png, .svg or .pdf."),
     ] = None,
-    topic: Annotated[
-        str | None, typer.Option(help="Scan topic of a bag, where it has several.")
-    ] = None,
+    topic: Topics = None,
+    laser_pose: LaserPose = None,
+    base_frame: BaseFrame = None,
+    laser_frame: LaserFrame = None,
     keep_pose: Annotated[
         Path | None,
         typer.Option(
@@ -76,11 +78,10 @@ def track(
     """
     requested = _parse_start(start)
     _check_targets(out, plot, keep_pose)
-    from firstfix.io.logs.load import load_recording
     from firstfix.io.maps.map_server import load_map
 
     grid = load_map(map_path)
-    recording = load_recording(log, topic=topic)
+    recording = read_log(log, topic, laser_pose, base_frame, laser_frame)
 
     # Imported after the files are read, so that bad input is refused at once.
     from firstfix.lab.experiments.track_log import (

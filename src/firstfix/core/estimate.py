@@ -174,8 +174,8 @@ class LocateResult:
         Wall time of the call, s.
     grid : OccupancyGrid or None
         The map that was searched, for pictures.
-    scan : LaserScan or None
-        The scan, for pictures.
+    scans : tuple of LaserScan
+        The scans, for pictures.
 
     Examples
     --------
@@ -192,7 +192,7 @@ class LocateResult:
     search: SearchReport
     elapsed_s: float
     grid: OccupancyGrid | None = field(default=None, repr=False)
-    scan: LaserScan | None = field(default=None, repr=False)
+    scans: tuple[LaserScan, ...] = field(default=(), repr=False)
 
     @property
     def best(self) -> Hypothesis | None:
@@ -265,13 +265,13 @@ class LocateResult:
         """
         from firstfix.plots import figure, result_picture
 
-        if self.grid is None or self.scan is None:
+        if self.grid is None or not self.scans:
             raise InputError(
                 expected="a result with its map and scan",
                 received="a result without them",
                 remedy="plot a result of ScanMatcher.locate",
             )
-        drawn = result_picture.result_figure(self.grid, self.scan, self, truth)
+        drawn = result_picture.result_figure(self.grid, self.scans, self, truth)
         if path is not None:
             figure.save_figure(drawn, Path(path))
         return drawn
@@ -280,7 +280,7 @@ class LocateResult:
         """Return the picture for notebooks; None without matplotlib, map or scan."""
         from firstfix.plots import figure
 
-        if self.grid is None or self.scan is None or not figure.can_draw():
+        if self.grid is None or not self.scans or not figure.can_draw():
             return None
         return figure.png_bytes(self.plot())
 

@@ -16,6 +16,9 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.core.trajectory import Trajectory
 
+MOST_APART_S = 0.15
+"""Scans of two sensors that are farther apart in time are not judged together."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -31,13 +34,15 @@ class Recording:
         ``T_map_base`` at each scan: x (m), y (m), yaw (rad); NaN rows where unknown.
     runs : ndarray of int, shape (n_scans,), or None
         Number of the uninterrupted drive that each scan belongs to.
+    sensors : ndarray of int, shape (n_scans,), or None
+        Number of the sensor of each scan, from 0, where there are several.
     notes : tuple of str
         Assumptions of the reader, and what it left out, in words.
 
     Raises
     ------
     ScanError
-        If there is no scan, or the shape of truth or runs does not match the scans.
+        If there is no scan, or the shape of truth, runs or sensors does not match the scans.
     InputError
         If a scan is not a LaserScan.
 
@@ -54,6 +59,7 @@ class Recording:
     odometry: Trajectory | None = None
     truth: NDArray[np.float64] | None = None
     runs: NDArray[np.int64] | None = None
+    sensors: NDArray[np.int64] | None = None
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -69,6 +75,7 @@ class Recording:
         for name, array, shape in (
             ("truth", self.truth, (n, 3)),
             ("runs", self.runs, (n,)),
+            ("sensors", self.sensors, (n,)),
         ):
             if array is not None and array.shape != shape:
                 raise ScanError(
@@ -86,6 +93,28 @@ class Recording:
         known = [name for name, value in has.items() if value is not None]
         extras = f", with {' and '.join(known)}" if known else ""
         return f"<Recording {len(self)} scans in {duration:.1f} s{extras}>"
+
+    def instants(self) -> list[tuple[int, ...]]:
+        """Return the scans that were taken together, as indices.
+
+        Returns
+        -------
+        list of tuple of int
+            For each scan of the first sensor: itself, and the scan of each other sensor that is
+            nearest in time, where it is within `MOST_APART_S`.
+        """
+        if self.sensors is None:
+            return [(i,) for i in range(len(self))]
+        stamps = np.array([scan.stamp for scan in self.scans])
+        groups = [np.flatnonzero(self.sensors == sensor) for sensor in np.unique(self.sensors)]
+        first, others = groups[0].tolist(), groups[1:]
+        nearest = [
+            [group[np.abs(stamps[group] - stamps[i]).argmin()] for i in first] for group in others
+        ]
+        return [
+            (i, *(int(j) for j in together if abs(stamps[j] - stamps[i]) <= MOST_APART_S))
+            for i, *together in zip(first, *nearest, strict=True)
+        ]
 
     def messages(self) -> Iterator[Odometry | LaserScan]:
         """Return odometry and scans in the order of their stamps, as a robot sends them.

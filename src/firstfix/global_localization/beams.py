@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,13 @@ LONGEST_M = 30.0
 # Fewer hits than this cannot distinguish places.
 FEWEST_HITS = 8
 
+# The search grid cannot tell sensors apart that are this near to each other.
+_ONE_ORIGIN_M = 0.1
+
 
 @dataclass(frozen=True, eq=False)
 class Beams:
-    """Valid beams in the upright sensor frame.
+    """Valid beams in the upright sensor frame, or those of several sensors in the frame of one.
 
     Parameters
     ----------
@@ -30,27 +34,50 @@ class Beams:
         Distances, m; without a return the distance that is free.
     hit : ndarray of bool, shape (n,)
         True where a surface returned the beam.
+    origins : ndarray, shape (n, 2), or None
+        Where the beams begin, m; None where all begin at the origin of the frame.
     """
 
     bearings: NDArray[np.float64]
     ranges: NDArray[np.float64]
     hit: NDArray[np.bool_]
+    origins: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.ranges)
 
+    @cached_property
+    def starts(self) -> NDArray[np.float64]:
+        """Where the beams begin, shape (n, 2), m."""
+        return np.zeros((len(self), 2)) if self.origins is None else self.origins
+
+    @property
+    def ends(self) -> NDArray[np.float64]:
+        """Where the beams end, shape (n, 2), m."""
+        directions = np.column_stack([np.cos(self.bearings), np.sin(self.bearings)])
+        ends: NDArray[np.float64] = self.starts + self.ranges[:, None] * directions
+        return ends
+
     def hits(self) -> Beams:
         """Return only the beams that a surface returned."""
-        return self._take(np.flatnonzero(self.hit))
+        return self.take(np.flatnonzero(self.hit))
+
+    def from_origin(self) -> Beams:
+        """Return only the beams that begin at the origin, to the precision of the search."""
+        if self.origins is None:
+            return self
+        return self.take(np.flatnonzero(np.hypot(*self.origins.T) <= _ONE_ORIGIN_M))
 
     def thinned(self, n: int) -> Beams:
         """Return at most n of the beams, evenly chosen."""
         if len(self) <= n:
             return self
-        return self._take(np.linspace(0, len(self) - 1, n).round().astype(np.int64))
+        return self.take(np.linspace(0, len(self) - 1, n).round().astype(np.int64))
 
-    def _take(self, index: NDArray[np.int64]) -> Beams:
-        return Beams(self.bearings[index], self.ranges[index], self.hit[index])
+    def take(self, index: NDArray[np.int64]) -> Beams:
+        """Return the beams of these indices."""
+        origins = None if self.origins is None else self.origins[index]
+        return Beams(self.bearings[index], self.ranges[index], self.hit[index], origins)
 
 
 def usable_beams(scan: LaserScan, longest_m: float = LONGEST_M) -> Beams:

@@ -99,7 +99,7 @@ class ExhaustiveSearch:
         fields, poses = self._fields, self._poses
         hits = usable_beams(scan, longest_m=_longest(fields)).hits()
         if len(hits) == 0:
-            return nothing_to_match(scan, 0, 1, time.perf_counter() - started)
+            return nothing_to_match(len(scan), 0, 1, time.perf_counter() - started)
         tried, scores = self.pose_scores(hits)
         ranked = distinct_places(tried, scores, fields.grid.resolution, _HYPOTHESES)
         verification = verify(tried[ranked], usable_beams(scan), fields)

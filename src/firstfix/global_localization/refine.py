@@ -103,8 +103,8 @@ def refine_on_field(
     refined = poses.copy()
     _descend_field(
         refined,
-        hits.ranges / resolution * np.cos(hits.bearings),
-        hits.ranges / resolution * np.sin(hits.bearings),
+        hits.starts[:, 0] / resolution + hits.ranges / resolution * np.cos(hits.bearings),
+        hits.starts[:, 1] / resolution + hits.ranges / resolution * np.sin(hits.bearings),
         fields.squares,
         fields.distances,
         sigmas / resolution,
@@ -145,6 +145,7 @@ def refine_on_rays(
         refined,
         information,
         variances,
+        hits.starts / resolution,
         np.cos(hits.bearings),
         np.sin(hits.bearings),
         hits.ranges / resolution,
@@ -236,6 +237,7 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
     poses: NDArray[np.float64],
     information: NDArray[np.float64],
     variances: NDArray[np.float64],
+    starts: NDArray[np.float64],
     cosines: NDArray[np.float64],
     sines: NDArray[np.float64],
     ranges: NDArray[np.float64],
@@ -264,13 +266,16 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
             for i in range(ranges.shape[0]):
                 dx = cos * cosines[i] - sin * sines[i]
                 dy = sin * cosines[i] + cos * sines[i]
+                arm_x = cos * starts[i, 0] - sin * starts[i, 1]
+                arm_y = sin * starts[i, 0] + cos * starts[i, 1]
+                x, y = poses[k, 0] + arm_x, poses[k, 1] + arm_y
                 reach = ranges[i] + gate + _BEYOND_GATE_CELLS
-                expected = cast_ray_leaping(clearance, poses[k, 0], poses[k, 1], dx, dy, reach)
+                expected = cast_ray_leaping(clearance, x, y, dx, dy, reach)
                 nx, ny = _normal(
                     squares,
                     distances,
-                    poses[k, 0] + (expected - _BEFORE_WALL_CELLS) * dx,
-                    poses[k, 1] + (expected - _BEFORE_WALL_CELLS) * dy,
+                    x + (expected - _BEFORE_WALL_CELLS) * dx,
+                    y + (expected - _BEFORE_WALL_CELLS) * dy,
                 )
                 slant = nx * dx + ny * dy
                 if slant < _LEAST_SLANT:
@@ -280,7 +285,7 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
                     continue
                 w = math.exp(-0.5 * (residual / sigma) ** 2)
                 J[0], J[1] = nx, ny
-                J[2] = ranges[i] * (dx * ny - dy * nx)
+                J[2] = ranges[i] * (dx * ny - dy * nx) + (arm_x * ny - arm_y * nx)
                 J[3] = -1.0
                 for a in range(4):
                     g[a] += w * J[a] * residual

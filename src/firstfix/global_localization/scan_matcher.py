@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
-from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
+from firstfix.global_localization.beams import FEWEST_HITS
 from firstfix.global_localization.config import LocateConfig, Method
 from firstfix.global_localization.exhaustive import BASIC, FAST, ExhaustiveSearch
 from firstfix.global_localization.places import distinct_places
@@ -24,6 +25,7 @@ from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.scoring import score_poses, search_locally
 from firstfix.global_localization.search import search
 from firstfix.global_localization.searchable import check_positions, check_searchable
+from firstfix.global_localization.sensors import as_scans, at_one_time, instants, joint_beams
 from firstfix.global_localization.verdict import judge, nothing_to_match, place_probabilities
 from firstfix.global_localization.verify import Verification, verified_place, verify
 
@@ -94,20 +96,21 @@ class ScanMatcher:
         scan: LaserScan | Sequence[LaserScan],
         T_odom_base: Sequence[SE2] | None = None,
     ) -> LocateResult:
-        """Find where in the map a scan was taken, or the last one of several.
+        """Find where in the map a scan was taken, or the newest of several.
 
         Parameters
         ----------
         scan : LaserScan or sequence of LaserScan
-            One scan, with the sensor's pose on the robot; or several scans of a robot that stood,
-            turned or drove a little, oldest first: they are judged together.
+            One scan, with the sensor's pose on the robot. Or one scan of each sensor, in any order.
+            Or several scans of each, oldest first, of a robot that stood, turned or drove a little.
+            All are judged together.
         T_odom_base : sequence of SE2, optional
             Odometry at each of several scans; by default the robot stood still.
 
         Returns
         -------
         LocateResult
-            Verdict and ranked hypotheses for ``T_map_base`` at the last scan.
+            Verdict and ranked hypotheses for ``T_map_base`` at the newest scan.
 
         Raises
         ------
@@ -115,12 +118,20 @@ class ScanMatcher:
             If several scans and their odometry do not belong together, or the method takes one
             scan only.
         """
-        if not isinstance(scan, LaserScan) and isinstance(scan, Sequence):
-            return self._locate_several(scan, T_odom_base)
-        as_instance(LaserScan, scan, "scan")
+        scans = as_scans(scan)
+        if len(scans) == 1:
+            result = self._locate_one(scans[0])
+        else:
+            result = self._locate_several(scans, T_odom_base)
+        return replace(result, grid=self.fields.grid)
+
+    def __repr__(self) -> str:
+        return f"<ScanMatcher {self.method.value} in {self.fields.grid!r}>"
+
+    def _locate_one(self, scan: LaserScan) -> LocateResult:
         if self._exhaustive is not None:
-            return self._exhaustive.locate(scan)
-        return locate(scan, self.fields, self.config)
+            return replace(self._exhaustive.locate(scan), scans=(scan,))
+        return locate((scan,), self.fields, self.config)
 
     def _locate_several(
         self, scans: Sequence[LaserScan], T_odom_base: Sequence[SE2] | None
@@ -134,10 +145,10 @@ class ScanMatcher:
                 received=f'method "{self.method.value}"',
                 remedy="give one scan, or use the default method",
             )
-        for scan in scans:
-            as_instance(LaserScan, scan, "scan")
         odometry = [SE2.identity()] * len(scans) if T_odom_base is None else T_odom_base
         poses = [as_pose(pose, "T_odom_base") for pose in odometry]
+        if len(instants(scans)) == 1:
+            return locate(at_one_time(scans, poses), self.fields, self.config)
         return locate_several(scans, poses, self.fields)
 
     def score_poses(self, scan: LaserScan, poses: Sequence[SE2]) -> tuple[Hypothesis, ...]:
@@ -177,13 +188,13 @@ class ScanMatcher:
         return search_locally(scan, as_pose(T_map_base, "T_map_base"), self.fields)
 
 
-def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateResult:
+def locate(scans: Sequence[LaserScan], fields: MapFields, config: LocateConfig) -> LocateResult:
     """Search, refine, verify, judge.
 
     Parameters
     ----------
-    scan : LaserScan
-        The scan, with the sensor's pose on the robot.
+    scans : sequence of LaserScan
+        One of each sensor, with its pose on the robot.
     fields : MapFields
         The prepared map.
     config : LocateConfig
@@ -196,10 +207,12 @@ def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateRe
     """
     started = time.perf_counter()
     resolution = fields.grid.resolution
-    beams = usable_beams(scan)
+    scan, beams = joint_beams(scans)
     hits = int(np.count_nonzero(beams.hit))
     if hits < FEWEST_HITS:
-        return nothing_to_match(scan, hits, FEWEST_HITS, time.perf_counter() - started)
+        return nothing_to_match(
+            sum(map(len, scans)), hits, FEWEST_HITS, time.perf_counter() - started
+        )
 
     candidates, report = search(beams, fields, config.shortlist, config.max_poses)
     poses = refine_on_field(candidates.poses, beams, fields)
@@ -221,7 +234,8 @@ def locate(scan: LaserScan, fields: MapFields, config: LocateConfig) -> LocateRe
         for i, probability in zip(ranked, probabilities, strict=True)
     )
     verdict, reason = _judge(verification, ranked, probabilities, report, config)
-    return LocateResult(verdict, reason, hypotheses, report, time.perf_counter() - started)
+    elapsed_s = time.perf_counter() - started
+    return LocateResult(verdict, reason, hypotheses, report, elapsed_s, scans=tuple(scans))
 
 
 def worth_listing(scores: NDArray[np.float64], beams: int) -> int:

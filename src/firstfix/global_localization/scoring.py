@@ -18,6 +18,7 @@ from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import Beams, usable_beams
 from firstfix.global_localization.frames import to_cells
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
+from firstfix.global_localization.sensors import joint_beams
 from firstfix.global_localization.verdict import place_probabilities
 from firstfix.global_localization.verify import (
     BEAMS,
@@ -137,13 +138,15 @@ class ClassifiedBeams:
         return float(np.count_nonzero(self.classes == kind) / max(1, len(self.classes)))
 
 
-def classify_beams(scan: LaserScan, T_map_base: SE2, fields: MapFields) -> ClassifiedBeams:
-    """Classify the beams of a scan at a pose.
+def classify_beams(
+    scans: Sequence[LaserScan], T_map_base: SE2, fields: MapFields
+) -> ClassifiedBeams:
+    """Classify the beams of one or several sensors at a pose.
 
     Parameters
     ----------
-    scan : LaserScan
-        The scan, with the sensor's pose on the robot.
+    scans : sequence of LaserScan
+        One of each sensor, with its pose on the robot.
     T_map_base : SE2
         Pose of the robot.
     fields : MapFields
@@ -154,15 +157,9 @@ def classify_beams(scan: LaserScan, T_map_base: SE2, fields: MapFields) -> Class
     ClassifiedBeams
         At most `firstfix.global_localization.verify.BEAMS` beams.
     """
-    beams = usable_beams(scan).thinned(BEAMS)
-    T_map_laser = T_map_base @ scan.T_base_laser
-    directions = T_map_laser.yaw + beams.bearings
-    ends = np.column_stack(
-        [
-            T_map_laser.x + beams.ranges * np.cos(directions),
-            T_map_laser.y + beams.ranges * np.sin(directions),
-        ]
-    )
+    scan, beams = joint_beams(scans)
+    beams = beams.thinned(BEAMS)
+    ends = (T_map_base @ scan.T_base_laser).apply(beams.ends)
     classes = beam_classes(to_cells(fields.grid, scan, T_map_base), beams, fields)
     return ClassifiedBeams(ends, beams.hit, classes)
 

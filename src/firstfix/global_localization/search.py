@@ -87,7 +87,8 @@ def search(
     Parameters
     ----------
     beams : Beams
-        At least one, in the sensor frame.
+        At least one from the origin, in the sensor frame. Of beams with other origins only the end
+        points count here.
     fields : MapFields
         The prepared map.
     shortlist : int
@@ -121,9 +122,9 @@ def search(
 def _queries(beams: Beams, fields: MapFields) -> _Queries:
     hits = beams.hits()
     reached = hits.ranges < range_table.REACH_M
-    ends = Beams(hits.bearings[reached], hits.ranges[reached], hits.hit[reached])
-    ends = ends.thinned(ENDPOINT_BEAMS)
-    directions, seen = by_direction(beams)
+    ends = hits.take(np.flatnonzero(reached)).thinned(ENDPOINT_BEAMS)
+    # The table has the ranges from a position; those of a sensor beside it are others.
+    directions, seen = by_direction(beams.from_origin())
     keep = np.linspace(0, len(seen) - 1, min(RANGE_BEAMS, len(seen))).round().astype(np.int64)
     # The kernel takes four beams at a time; padding costs nothing.
     padding = -len(keep) % 4
@@ -144,10 +145,13 @@ def _queries(beams: Beams, fields: MapFields) -> _Queries:
 def _endpoint_offsets(ends: Beams, fields: MapFields) -> NDArray[np.int64]:
     headings = np.arange(DIRECTIONS)[:, None] * (FULL_TURN / DIRECTIONS)
     cells = ends.ranges / fields.grid.resolution
+    start_x, start_y = ends.starts.T / fields.grid.resolution
+    cos, sin = np.cos(headings), np.sin(headings)
     angles = ends.bearings + headings
     offset = fields.positions.offset
     return fields.endpoints.offsets(
-        offset + cells * np.sin(angles), offset + cells * np.cos(angles)
+        offset + (sin * start_x + cos * start_y) + cells * np.sin(angles),
+        offset + (cos * start_x - sin * start_y) + cells * np.cos(angles),
     )
 
 

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.estimate import Evidence, LocateResult, SearchReport, Verdict
-from firstfix.core.scan import LaserScan
 
 # The noise of a scan in a map (people, moved chairs, an imprecise drawing) is unknown beforehand.
 # Marginalised over this unknown scale (as Student's t comes from Gauss), the likelihood of a place
@@ -116,11 +115,11 @@ def count_rivals(probabilities: NDArray[np.float64]) -> int:
     return int(np.count_nonzero(probabilities >= RIVAL_SHARE * probabilities.max(initial=0.0)))
 
 
-def nothing_to_match(scan: LaserScan, hits: int, needed: int, elapsed_s: float) -> LocateResult:
-    """Return NO_MATCH for a valid scan with too few hits."""
+def nothing_to_match(beams: int, hits: int, needed: int, elapsed_s: float) -> LocateResult:
+    """Return NO_MATCH for valid scans with too few hits."""
     return LocateResult(
         verdict=Verdict.NO_MATCH,
-        reason=f"only {hits} of {len(scan)} beams measured a surface, {needed} are needed: "
+        reason=f"only {hits} of {beams} beams measured a surface, {needed} are needed: "
         "blocked sensor, open space, or limits range_min and range_max that do not fit it",
         hypotheses=(),
         search=SearchReport(poses=0, searched=0.0, proven=False),

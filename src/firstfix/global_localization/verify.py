@@ -186,6 +186,7 @@ def _compared(
     classes = np.empty((len(poses), len(used)), np.uint8)
     _verify(
         poses,
+        used.starts / fields.grid.resolution,
         np.cos(used.bearings),
         np.sin(used.bearings),
         used.ranges,
@@ -206,6 +207,7 @@ def _compared(
 @kernel
 def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
     poses: NDArray[np.float64],
+    starts: NDArray[np.float64],
     cosines: NDArray[np.float64],
     sines: NDArray[np.float64],
     ranges: NDArray[np.float64],
@@ -234,9 +236,11 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
         for i in range(ranges.shape[0]):
             dx = cos * cosines[i] - sin * sines[i]
             dy = sin * cosines[i] + cos * sines[i]
+            start_x = poses[k, 0] + (cos * starts[i, 0] - sin * starts[i, 1])
+            start_y = poses[k, 1] + (sin * starts[i, 0] + cos * starts[i, 1])
             reach = ranges[i] + (_SHORT_LIMIT_M if hit[i] else 0.0)
             expected = resolution * cast_ray_leaping(
-                clearance, poses[k, 0], poses[k, 1], dx, dy, reach / resolution
+                clearance, start_x, start_y, dx, dy, reach / resolution
             )
             gap = ranges[i] - expected
             through = gap > _THROUGH_M
@@ -248,8 +252,8 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
                 classes[k, i] = _THROUGH if through else _EXPLAINED
                 counts[k, classes[k, i]] += 1
                 continue
-            x = math.floor(poses[k, 0] + ranges[i] / resolution * dx)
-            y = math.floor(poses[k, 1] + ranges[i] / resolution * dy)
+            x = math.floor(start_x + ranges[i] / resolution * dx)
+            y = math.floor(start_y + ranges[i] / resolution * dy)
             inside = 0 <= x < width and 0 <= y < height
             distance = distances_m[squares[y, x]] if inside else _FAR_M
             near = math.exp(-0.5 * (distance / _SIGMA_M) ** 2)

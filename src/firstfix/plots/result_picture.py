@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,7 +37,7 @@ BEAM_COLOURS = {
 
 def draw_result(
     grid: OccupancyGrid,
-    scan: LaserScan,
+    scans: Sequence[LaserScan],
     result: LocateResult,
     path: Path,
     truth: SE2 | None = None,
@@ -45,7 +46,7 @@ def draw_result(
 
     Parameters
     ----------
-    grid, scan, result, truth
+    grid, scans, result, truth
         As in `result_figure`.
     path : Path
         File to write; its suffix gives the format: .png, .svg or .pdf.
@@ -60,20 +61,23 @@ def draw_result(
     InputError
         If it cannot be written, or matplotlib is not installed.
     """
-    return save_figure(result_figure(grid, scan, result, truth), path)
+    return save_figure(result_figure(grid, scans, result, truth), path)
 
 
 def result_figure(
-    grid: OccupancyGrid, scan: LaserScan, result: LocateResult, truth: SE2 | None = None
+    grid: OccupancyGrid,
+    scans: Sequence[LaserScan],
+    result: LocateResult,
+    truth: SE2 | None = None,
 ) -> Figure:
-    """Draw a result: the whole map with all places, and the scan at the best place.
+    """Draw a result: the whole map with all places, and the scans at the best place.
 
     Parameters
     ----------
     grid : OccupancyGrid
         The map.
-    scan : LaserScan
-        The scan.
+    scans : sequence of LaserScan
+        One of each sensor.
     result : LocateResult
         The result.
     truth : SE2 or None
@@ -95,8 +99,8 @@ def result_figure(
     draw_map(near, grid)
     best = result.best
     if best is not None:
-        _draw_scan(near, grid, scan, best.pose)
-        _zoom(near, scan, best.pose)
+        _draw_scans(near, grid, scans, best.pose)
+        _zoom(near, scans, best.pose)
     for axes in (whole, near):
         for rank, hypothesis in reversed(list(enumerate(result.hypotheses, 1))):
             if rank == 1 or hypothesis.probability >= LEAST_DRAWN:
@@ -112,9 +116,11 @@ def result_figure(
     return figure
 
 
-def _draw_scan(axes: Axes, grid: OccupancyGrid, scan: LaserScan, T_map_base: SE2) -> None:
+def _draw_scans(
+    axes: Axes, grid: OccupancyGrid, scans: Sequence[LaserScan], T_map_base: SE2
+) -> None:
     """Draw the beams that hit; the shares of the legend count those without a return, too."""
-    beams = classify_beams(scan, T_map_base, MapFields(grid))
+    beams = classify_beams(scans, T_map_base, MapFields(grid))
     for kind, colour in BEAM_COLOURS.items():
         x, y = beams.ends[beams.hit & (beams.classes == kind)].T
         if beams.share(kind) > 0.0:
@@ -160,9 +166,10 @@ def _draw_hypothesis(axes: Axes, rank: int, hypothesis: Hypothesis) -> None:
     )
 
 
-def _zoom(axes: Axes, scan: LaserScan, T_map_base: SE2) -> None:
-    """Show the scan and the robot, but not a few stray far returns."""
-    points = np.vstack([T_map_base.apply(scan.points()), [T_map_base.x, T_map_base.y]])
+def _zoom(axes: Axes, scans: Sequence[LaserScan], T_map_base: SE2) -> None:
+    """Show the scans and the robot, but not a few stray far returns."""
+    ends = [T_map_base.apply(scan.points()) for scan in scans]
+    points = np.vstack([*ends, [T_map_base.x, T_map_base.y]])
     low, high = np.percentile(points, [1.0, 99.0], axis=0)
     low, high = np.minimum(low, points[-1]), np.maximum(high, points[-1])
     half = np.maximum(LEAST_VIEW_M, 0.55 * (high - low))

@@ -44,7 +44,7 @@ def scan_frame(registered: RegisteredScan | None, active_map: ActiveMap | None) 
     if registered is None or active_map is None:
         return _HEADER.pack(SCAN, VERSION, 0, 0, 0.0)
     scan = registered.scan
-    beams = classify_beams(scan, registered.T_map_base, active_map.matcher.fields)
+    beams = classify_beams([scan], registered.T_map_base, active_map.matcher.fields)
     classes = np.where(beams.hit, beams.classes, np.uint8(NO_RETURN))
     header = _HEADER.pack(SCAN, VERSION, 0, len(classes), scan.stamp)
     return header + beams.ends.astype("<f4").tobytes() + classes.tobytes()

@@ -32,7 +32,7 @@ def test_an_answer_becomes_a_picture(
     tmp_path: Path, hall: OccupancyGrid, cross: LaserScan, middle: SE2, answer: Any, suffix: str
 ) -> None:
     result = answer(middle, SE2(5.0, 3.0, math.pi), verdict=Verdict.AMBIGUOUS)
-    path = draw_result(hall, cross, result, tmp_path / f"place.{suffix}", middle)
+    path = draw_result(hall, [cross], result, tmp_path / f"place.{suffix}", middle)
     assert path.is_absolute()
     assert path.stat().st_size > 5000
     if suffix == "png":
@@ -42,14 +42,14 @@ def test_an_answer_becomes_a_picture(
 def test_no_place_is_a_picture_too(
     tmp_path: Path, hall: OccupancyGrid, cross: LaserScan, answer: Any
 ) -> None:
-    draw_result(hall, cross, answer(verdict=Verdict.NO_MATCH), tmp_path / "nowhere.png")
+    draw_result(hall, [cross], answer(verdict=Verdict.NO_MATCH), tmp_path / "nowhere.png")
 
 
 def test_a_scan_without_a_hit_is_a_picture_too(
     tmp_path: Path, hall: OccupancyGrid, middle: SE2, answer: Any
 ) -> None:
     blind = LaserScan(np.full(4, np.inf), 0.0, 0.1, 0.1, 10.0)
-    draw_result(hall, blind, answer(middle), tmp_path / "blind.png")
+    draw_result(hall, [blind], answer(middle), tmp_path / "blind.png")
 
 
 @pytest.mark.parametrize("name", ["place.jpeg", "place", "place.txt"])

@@ -21,6 +21,7 @@ from firstfix.io.logs.checks import (
     located,
     sorting_notes,
 )
+from firstfix.io.logs.given_frames import GivenFrames
 from firstfix.io.ros_messages.incoming import (
     to_frame,
     to_laser_scan,
@@ -49,7 +50,11 @@ class _Sweep(NamedTuple):
 
 
 def load_bag(
-    path: str | Path, *, topic: str | None = None, max_scans: int | None = None
+    path: str | Path,
+    *,
+    topic: str | None = None,
+    max_scans: int | None = None,
+    given: GivenFrames = GivenFrames(),  # noqa: B008 - it is frozen
 ) -> Recording:
     """Read the scans of one topic, and the odometry, from a bag.
 
@@ -67,6 +72,8 @@ def load_bag(
         Topic of the scans; None for the only one, or ``scan`` if there are several.
     max_scans : int or None
         Only the first ones by stamp.
+    given : GivenFrames
+        Frames, and the pose of the sensor, where the transforms of the bag do not have them.
 
     Returns
     -------
@@ -94,8 +101,8 @@ def load_bag(
             until_ns = max(sweep.time_ns for sweep in sweeps) + AFTER_LAST_SCAN_NS
         tree = _transforms(bag, until_ns)
         frames = sorted({to_frame(sweep.message.header.frame_id) for sweep in sweeps})
-        base, odometry, notes = _odometry(bag, tree, frames[0], until_ns)
-        places = {frame: _place(tree, base, frame, frames) for frame in frames}
+        base, odometry, notes = _odometry(bag, tree, frames[0], given, until_ns)
+        places = {frame: _place(tree, base, frame, frames, given) for frame in frames}
         return _recording(topic, sweeps, places, odometry, [*notes, *sorting_notes(order)])
 
 
@@ -135,9 +142,9 @@ def _transforms(bag: BagFile, until_ns: int | None) -> TransformTree:
 
 
 def _odometry(
-    bag: BagFile, tree: TransformTree, frame: str, until_ns: int | None
+    bag: BagFile, tree: TransformTree, frame: str, given: GivenFrames, until_ns: int | None
 ) -> tuple[str | None, Trajectory | None, list[str]]:
-    base = tree.base_of(frame)
+    base = _base(tree, frame, given)
     odometry = None if base is None else tree.odometry(base)
     names = bag.topics_of(ODOMETRY)
     if odometry is not None or not names:
@@ -146,17 +153,36 @@ def _odometry(
     name = next((name for name in names if name.strip("/") == "odom"), names[0])
     messages = bag.messages(ODOMETRY, [name], until_ns=until_ns)
     tree.add_odometry(to_odometry(message) for _, message in messages)
-    base = tree.base_of(frame)
+    base = _base(tree, frame, given)
     odometry = None if base is None else tree.odometry(base)
     if odometry is None:
         return base, None, [f"{name} has no frame that is rigidly connected to the sensor"]
     return base, odometry, [f"odometry is from {name}, because no transform contains it"]
 
 
-def _place(tree: TransformTree, base: str | None, frame: str, frames: list[str]) -> SensorPlace:
+def _base(tree: TransformTree, frame: str, given: GivenFrames) -> str | None:
+    if given.base is not None:
+        return to_frame(given.base)
+    if given.T_base_laser is not None:
+        return next(iter(tree.bases()), None)
+    return tree.base_of(given.laser or frame)
+
+
+def _place(
+    tree: TransformTree, base: str | None, frame: str, frames: list[str], given: GivenFrames
+) -> SensorPlace:
+    if given.T_base_laser is not None:
+        return SensorPlace(given.T_base_laser, given.mounting)
+    frame = to_frame(given.laser or frame)
     T = None if base is None else tree.fixed(base, frame)
     if T is not None:
         return place_of(frame, T)
+    if given.any:
+        raise ScanError(
+            expected=f"fixed transforms from {base or 'a base'} to {frame}",
+            received="none in the bag",
+            remedy="check the names of the frames, or give the pose of the sensor: --laser-pose",
+        )
     if len(frames) == 1:
         return unknown_place(frame)
     raise ScanError(

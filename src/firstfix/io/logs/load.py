@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
+from firstfix.core.arguments import as_member, as_pose
 from firstfix.core.errors import ScanError
 from firstfix.core.recording import Recording
+from firstfix.core.scan import Mounting
+from firstfix.core.se2 import SE2
+from firstfix.io.logs.given_frames import GivenFrames
 
 BAG_SUFFIXES = (".bag", ".db3", ".mcap")
 CARMEN_SUFFIXES = (".log", ".clf", ".carmen")
 
 
 def load_recording(
-    path: str | Path, *, topic: str | None = None, max_scans: int | None = None
+    path: str | Path,
+    *,
+    topic: str | Sequence[str] | None = None,
+    max_scans: int | None = None,
+    T_base_laser: SE2 | tuple[float, float, float] | None = None,
+    mounting: Mounting | str = Mounting.UPRIGHT,
+    base_frame: str | None = None,
+    laser_frame: str | None = None,
 ) -> Recording:
     """Read a recording in any supported format.
 
@@ -21,11 +35,17 @@ def load_recording(
     path : str or Path
         ``.npz``; ``.bag``; the folder of a ROS 2 bag, or its ``.db3`` or ``.mcap``; a CARMEN log
         ``.log``, ``.clf`` or ``.carmen``, also with ``.gz``.
-    topic : str or None
-        Topic of the scans in a bag, or FLASER, RLASER, ROBOTLASER1 in a CARMEN log; None to
-        choose.
+    topic : str, sequence of str or None
+        Topic of the scans in a bag, or of each of several sensors; FLASER, RLASER, ROBOTLASER1 in
+        a CARMEN log; None to choose.
     max_scans : int or None
-        Only the first ones by stamp.
+        Only the first ones by stamp, of each sensor.
+    T_base_laser : SE2, optional
+        Pose of the sensor on the robot, for a bag whose transforms do not have it.
+    mounting : Mounting or str
+        Which way up it is then.
+    base_frame, laser_frame : str, optional
+        Frames of the robot and of the sensor, where those that a bag states are wrong.
 
     Returns
     -------
@@ -36,7 +56,7 @@ def load_recording(
     Raises
     ------
     ScanError
-        If there is no readable recording at the path.
+        If there is no readable recording at the path, or frames are given for a format without.
 
     Examples
     --------
@@ -45,12 +65,46 @@ def load_recording(
     <Recording 1 scans in 0.0 s>
     """
     path = Path(path)
+    pose = None if T_base_laser is None else as_pose(T_base_laser, "T_base_laser")
+    given = GivenFrames(pose, as_member(Mounting, mounting, "mounting"), base_frame, laser_frame)
+    topics = (topic,) if topic is None or isinstance(topic, str) else tuple(topic) or (None,)
+    if len(topics) == 1:
+        return _load(path, topics[0], max_scans, given)
+    if given.T_base_laser is not None or given.laser is not None:
+        raise ScanError(
+            expected=f"one topic with the pose or the frame of its sensor in {path}",
+            received=f"{len(topics)} topics",
+            remedy="leave the pose out, or name one topic",
+        )
+    return _together([_load(path, each, max_scans, given) for each in topics])
+
+
+def _together(recordings: Sequence[Recording]) -> Recording:
+    """Put the recordings of several sensors of one robot in the order of their stamps."""
+    scans = [scan for recording in recordings for scan in recording.scans]
+    sensors = np.repeat(np.arange(len(recordings)), [len(recording) for recording in recordings])
+    order = np.argsort([scan.stamp for scan in scans], kind="stable")
+    return Recording(
+        scans=tuple(scans[i] for i in order),
+        odometry=max((r.odometry for r in recordings if r.odometry), key=len, default=None),
+        sensors=sensors[order],
+        notes=tuple(dict.fromkeys(note for recording in recordings for note in recording.notes)),
+    )
+
+
+def _load(path: Path, topic: str | None, max_scans: int | None, given: GivenFrames) -> Recording:
     suffix = _suffix(path)
     # Imported here because rosbags takes a tenth of a second.
     if suffix in BAG_SUFFIXES or suffix == "/":
         from firstfix.io.logs.bag import load_bag
 
-        return load_bag(path, topic=topic, max_scans=max_scans)
+        return load_bag(path, topic=topic, max_scans=max_scans, given=given)
+    if given.any:
+        raise ScanError(
+            expected=f"no frames and no pose of the sensor for {path}",
+            received="one of them",
+            remedy="leave them out: only bags need them",
+        )
     if suffix in CARMEN_SUFFIXES:
         from firstfix.io.logs.carmen import load_carmen
 

@@ -76,6 +76,6 @@ def unknown_place(frame: str) -> SensorPlace:
     """Return the place of a sensor without transforms: its frame is the base."""
     note = (
         f"no fixed transforms lead from the base to {frame or 'the unnamed frame'} of the scans: "
-        "poses are those of the sensor, and odometry is left out"
+        "poses are those of the sensor, and odometry is left out; --laser-pose gives its pose"
     )
     return SensorPlace(SE2.identity(), Mounting.UPRIGHT, (note,))

@@ -100,10 +100,19 @@ class TransformTree:
             A ``base_link``, else a ``base_footprint`` (in any namespace), else a frame that
             odometry moves; None if the sensor is fixed to none of them.
         """
-        frames = sorted({laser, *(frame for key in self._edges for frame in key)})
+        return next((f for f in self.bases(laser) if self.fixed(f, laser) is not None), None)
+
+    def bases(self, *others: str) -> list[str]:
+        """Return the frames that may be the robot: first those by name, then those that move.
+
+        Parameters
+        ----------
+        *others : str
+            Frames that count though no transform has them.
+        """
+        frames = sorted({*others, *(frame for key in self._edges for frame in key)})
         named = [f for name in BASE_NAMES for f in frames if f.rpartition("/")[2] == name]
-        moved = sorted(child for (_, child), edge in self._edges.items() if edge.path)
-        return next((f for f in (*named, *moved) if self.fixed(f, laser) is not None), None)
+        return named + sorted(child for (_, child), edge in self._edges.items() if edge.path)
 
     def odometry(self, base: str) -> Trajectory | None:
         """Return the odometry of the base.

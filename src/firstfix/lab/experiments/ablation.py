@@ -106,7 +106,7 @@ class AblatedMatcher:
         beams = usable_beams(scan)
         hits = int(np.count_nonzero(beams.hit))
         if hits < FEWEST_HITS:
-            return nothing_to_match(scan, hits, FEWEST_HITS, time.perf_counter() - started)
+            return nothing_to_match(len(scan), hits, FEWEST_HITS, time.perf_counter() - started)
         found, report = search(beams, self._searched, config.shortlist, config.max_poses)
         poses, covariances = self._sharpened(self._best_places(found, beams, config), beams)
         verification = verify(poses, beams, fields)

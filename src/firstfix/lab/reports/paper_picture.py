@@ -142,7 +142,7 @@ def _draw_way(axes: Axes, poses: list[SE2 | None], colour: str, label: str, widt
 
 
 def _draw_scan(axes: Axes, grid: OccupancyGrid, scan: LaserScan, T_map_base: SE2) -> None:
-    beams = classify_beams(scan, T_map_base, MapFields(grid))
+    beams = classify_beams([scan], T_map_base, MapFields(grid))
     for kind, colour in BEAM_COLOURS.items():
         x, y = beams.ends[beams.hit & (beams.classes == kind)].T
         if len(x):

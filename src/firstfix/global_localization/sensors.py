@@ -1,0 +1,144 @@
+"""Several sensors of one robot as one observation; beams keep their own origins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from firstfix.core.arguments import as_instance, as_pose
+from firstfix.core.errors import InputError
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.global_localization.beams import Beams, usable_beams
+
+# Odometry is taken at its word between the scans of one observation: a short way only.
+MOST_MOTION_M = 1.0
+
+_SAME_DIRECTION_RAD = 0.1
+
+
+def as_scans(scans: LaserScan | Sequence[LaserScan]) -> tuple[LaserScan, ...]:
+    """Return one scan or several as a tuple.
+
+    Raises
+    ------
+    InputError
+        If there is none, or one is not a LaserScan.
+    """
+    if not isinstance(scans, Sequence):
+        return (as_instance(LaserScan, scans, "scan"),)
+    if len(scans) == 0:
+        raise InputError("There is no scan in the list. Pass one scan of each sensor.")
+    return tuple(as_instance(LaserScan, scan, "scan") for scan in scans)
+
+
+def at_one_time(scans: Sequence[LaserScan], T_odom_base: Sequence[SE2]) -> tuple[LaserScan, ...]:
+    """Move the sensors to where they were, seen from the base at the newest scan.
+
+    Parameters
+    ----------
+    scans : sequence of LaserScan
+        Of one robot, in any order.
+    T_odom_base : sequence of SE2
+        Odometry at each of them.
+
+    Returns
+    -------
+    tuple of LaserScan
+        The same measurements; poses of the sensors in the base frame at the newest stamp.
+
+    Raises
+    ------
+    InputError
+        If the numbers of scans and poses differ, or the robot has moved more than `MOST_MOTION_M`.
+    """
+    if len(scans) != len(T_odom_base):
+        raise InputError(
+            expected="one pose T_odom_base for each scan",
+            received=f"{len(scans)} scans and {len(T_odom_base)} poses",
+            remedy="take the odometry at the stamp of each scan",
+        )
+    poses = [as_pose(pose, "T_odom_base") for pose in T_odom_base]
+    newest = max(range(len(scans)), key=lambda i: (scans[i].stamp, i))
+    farthest = max(pose.distance_to(poses[newest]) for pose in poses)
+    if farthest > MOST_MOTION_M:
+        raise InputError(
+            expected=f"scans of one place, at most {MOST_MOTION_M:g} m from each other",
+            received=f"odometry over {farthest:.1f} m",
+            remedy="pass one scan of each sensor, taken at about the same time",
+        )
+    T_base_odom = poses[newest].inverse()
+    return tuple(
+        scan
+        if pose == poses[newest]
+        else replace(scan, T_base_laser=T_base_odom @ pose @ scan.T_base_laser)
+        for scan, pose in zip(scans, poses, strict=True)
+    )
+
+
+def instants(scans: Sequence[LaserScan]) -> list[list[int]]:
+    """Put scans that follow each other together, up to the next one of a sensor that they have.
+
+    Parameters
+    ----------
+    scans : sequence of LaserScan
+        Of one robot, in the order of time.
+
+    Returns
+    -------
+    list of list of int
+        Indices; no sensor twice in a group.
+    """
+    groups: list[list[int]] = []
+    for i, scan in enumerate(scans):
+        if groups and not any(_is_same_sensor(scans[j], scan) for j in groups[-1]):
+            groups[-1].append(i)
+        else:
+            groups.append([i])
+    return groups
+
+
+def _is_same_sensor(a: LaserScan, b: LaserScan) -> bool:
+    """Compare pose and direction; the number of beams of one sensor may vary."""
+    middle_a, middle_b = (float(scan.bearings[[0, -1]].mean()) for scan in (a, b))
+    return a.T_base_laser == b.T_base_laser and abs(middle_a - middle_b) < _SAME_DIRECTION_RAD
+
+
+def joint_beams(scans: Sequence[LaserScan]) -> tuple[LaserScan, Beams]:
+    """Put the valid beams of several sensors together; each keeps its own origin.
+
+    Parameters
+    ----------
+    scans : sequence of LaserScan
+        Of one robot at one time; at least one, in any order.
+
+    Returns
+    -------
+    LaserScan
+        The scan with most hits. Its sensor frame is the frame of the beams.
+    Beams
+        Of all scans.
+    """
+    reference, *others = sorted(scans, key=_by_hits_and_place)
+    parts = [usable_beams(reference)]
+    if not others:
+        return reference, parts[0]
+    origins = [parts[0].starts]
+    T_laser_base = reference.T_base_laser.inverse()
+    for scan in others:
+        T_laser_other, beams = T_laser_base @ scan.T_base_laser, usable_beams(scan)
+        parts.append(Beams(beams.bearings + T_laser_other.yaw, beams.ranges, beams.hit))
+        origins.append(np.tile([T_laser_other.x, T_laser_other.y], (len(beams), 1)))
+    return reference, Beams(
+        bearings=np.concatenate([beams.bearings for beams in parts]),
+        ranges=np.concatenate([beams.ranges for beams in parts]),
+        hit=np.concatenate([beams.hit for beams in parts]),
+        origins=np.concatenate(origins),
+    )
+
+
+def _by_hits_and_place(scan: LaserScan) -> tuple[float, ...]:
+    # The place decides between equals, so that the order of the scans never counts.
+    return -float(np.count_nonzero(scan.hit)), *scan.T_base_laser, float(scan.bearings[0])
