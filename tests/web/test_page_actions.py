@@ -15,6 +15,8 @@ from firstfix.lab.worlds.catalog import WORLDS, random_free_poses
 
 pytestmark = pytest.mark.slow
 
+ORIGIN = WORLDS["rooms"]().extent[0], WORLDS["rooms"]().extent[2]
+
 Visitor = Callable[..., Visit]
 
 
@@ -167,6 +169,33 @@ def test_picking_a_place_resolves_an_ambiguous_start(
     assert page.data("chosen") == "true"
     assert "A person chose this place. 4 places fit" in page.page.inner_text("#verdict")
     assert page.colour_of("#state h2") == page.colour_variable("chosen")
+
+
+def test_the_belief_is_a_heat_layer(visit: Visitor, rooms_server: Server) -> None:
+    page = visit(rooms_server.url)
+    page.wait_for_map()
+    page.page.click("#relocalize")
+    page.wait_for_state("DISAMBIGUATING")
+    wait_until(
+        lambda: "4 places" in page.page.inner_text("#places-count"),
+        lambda: page.page.inner_text("#places-count"),
+    )
+    page.page.click("#pause")
+    page.page.wait_for_selector("#paused", state="visible")
+    x, y, _ = rooms_server.status()["hypotheses"][0]["pose"]
+    page.look_at(x, y, 100.0)
+    # The corners of the cell of half a metre around the place, beside its symbol.
+    left, bottom = (
+        0.5 * math.floor((c - o) / 0.5) + o for c, o in zip((x, y), ORIGIN, strict=True)
+    )
+    corners = [(left + dx, bottom + dy) for dx in (0.06, 0.44) for dy in (0.06, 0.44)]
+    page.page.wait_for_timeout(300)
+    shown = [page.colour("overlay", *corner) for corner in corners]
+    page.page.click("[data-layer=belief]")
+    page.page.wait_for_timeout(300)
+    hidden = [page.colour("overlay", *corner) for corner in corners]
+    page.page.click("#pause")
+    assert sum(one != other for one, other in zip(shown, hidden, strict=True)) >= 3
 
 
 def test_a_carried_robot_is_lifted_and_localized_again(page: Visit) -> None:

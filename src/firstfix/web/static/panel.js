@@ -78,6 +78,7 @@ export class Panel {
   #showPlaces(state) {
     const places = state.state === "LOCALIZED" ? [] : state.hypotheses;
     byId("places").hidden = places.length === 0;
+    setText(byId("places-count"), state.belief ? format.beliefText(state.belief) : "");
     const list = byId("places-list");
     while (list.children.length > places.length) list.lastElementChild.remove();
     while (list.children.length < places.length) list.append(this.#newPlace());

@@ -1,6 +1,6 @@
 /** The belief: the probability of all places as a heat layer over the map. */
 
-const FAINTEST = 0.14; // opacity of a cell with the least mass
+const FAINTEST = 0.12; // opacity of a cell with hardly any mass
 const STRONGEST = 0.85;
 
 let cached = { heat: null, colour: "", canvas: null };
@@ -30,7 +30,7 @@ function heatCanvas({ width, height, values }, colour) {
   ctx.fillStyle = colour;
   values.forEach((value, i) => {
     if (value === 0) return;
-    ctx.globalAlpha = FAINTEST + (STRONGEST - FAINTEST) * (value / 255);
+    ctx.globalAlpha = FAINTEST + (STRONGEST - FAINTEST) * Math.sqrt(value / 255);
     ctx.fillRect(i % width, height - 1 - Math.floor(i / width), 1, 1);
   });
   return canvas;
