@@ -140,7 +140,8 @@ def look_again(tracks: Tracks, window: Sequence[Observation], fields: MapFields)
     sharp = settle_on_rays(few.now, seen, fields)
     gain = costs(few.now, seen, CAREFUL_BEAMS, fields) - costs(sharp, seen, CAREFUL_BEAMS, fields)
     # Rays are sharper, but in a map with smeared walls they can do harm: the better pose stays.
-    better = np.flatnonzero((gain > 0.0) & _are_near(few.now, sharp, fields))
+    held = _are_near(few.now, sharp, fields) if len(window) > 1 else True
+    better = np.flatnonzero((gain > 0.0) & held)
     poses, cost = careful.poses.copy(), careful.costs.copy()
     poses[better, last] = sharp[better]
     cost[better, last] -= gain[better]
