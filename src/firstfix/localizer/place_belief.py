@@ -33,10 +33,13 @@ from firstfix.global_localization.verdict import count_rivals
 _BACKGROUND_M = 2.0
 _BACKGROUND_RAD = math.radians(120.0)
 
-# A published pose is confirmed by so many views; from then on the background is enough.
+# A published pose is young until so many views have confirmed it. More than twice as many do not
+# count: what is known from long ago was known in another part of the map.
 _CONFIRMING_VIEWS = 4
+_MOST_CREDIT = 2 * _CONFIRMING_VIEWS
 
-# A published pose with less probability than this in two consecutive views is withdrawn.
+# A young pose with less probability than this in two consecutive views is withdrawn. An old one is
+# not: where the map is wrong, other places fit better for metres.
 _WITHDRAWN_SHARE = 0.05
 _WITHDRAWING_VIEWS = 2
 
@@ -81,7 +84,7 @@ class PlaceBelief:
         self._rest_period_s = rest_period_s
         self._used_at: tuple[float, SE2] | None = None
         self._places: tuple[Hypothesis, ...] = ()
-        self._views_since_fix = 0
+        self._credit = 0  # views that have confirmed the published pose
         self._views_against = 0
         self.belief = begin(fields, None, config)
 
@@ -163,13 +166,13 @@ class PlaceBelief:
 
     def pose_was_published(self) -> None:
         """Watch closely at first: the pose may be wrong."""
-        self._views_since_fix = self._views_against = 0
+        self._credit = self._views_against = 0
 
     @property
     def tracking_pace(self) -> Pace:
         """How often to weigh all places while a pose is tracked."""
-        is_young = self._views_since_fix < _CONFIRMING_VIEWS
-        return Pace.EVERY_VIEW if is_young else Pace.BACKGROUND
+        is_settled = self._credit >= _CONFIRMING_VIEWS and self._views_against == 0
+        return Pace.BACKGROUND if is_settled else Pace.EVERY_VIEW
 
     def support_for(self, T_map_base: SE2) -> Support:
         """Compare a published pose with the belief; call it once after each update.
@@ -182,21 +185,23 @@ class PlaceBelief:
         Returns
         -------
         Support
-            WITHDRAWN needs two consecutive views.
+            OTHER_PLACE and WITHDRAWN need several consecutive views.
         """
-        self._views_since_fix += 1
         poses = [SE2.from_array(pose) for pose in self.belief.poses]
         here = [is_same_place(pose, T_map_base) for pose in poses]
         if here and here[0]:
-            self._views_against = 0
+            self._credit, self._views_against = min(self._credit + 1, _MOST_CREDIT), 0
             return Support.SAME_PLACE
-        if self.belief.verdict is Verdict.UNIQUE:
-            return Support.OTHER_PLACE
+        is_sure_elsewhere = self.belief.verdict is Verdict.UNIQUE
         share = float(self.belief.probabilities[here].sum())
         is_against = share < _WITHDRAWN_SHARE and self.belief.elsewhere < 0.5
         self._views_against = self._views_against + 1 if is_against else 0
-        is_withdrawn = self._views_against >= _WITHDRAWING_VIEWS
-        return Support.WITHDRAWN if is_withdrawn else Support.OPEN
+        if is_sure_elsewhere and 2 * self._views_against > self._credit:
+            return Support.OTHER_PLACE
+        is_young = self._credit < _CONFIRMING_VIEWS
+        if is_young and self._views_against >= _WITHDRAWING_VIEWS:
+            return Support.WITHDRAWN
+        return Support.OPEN
 
     def _is_due(self, scan: LaserScan, T_odom_base: SE2, pace: Pace) -> bool:
         if self._used_at is None or pace is Pace.EVERY_SCAN:
