@@ -87,21 +87,21 @@ def test_a_robot_that_is_carried_away_is_found_where_it_is_set_down(ros1: Lab) -
 
 
 def test_at_rest_a_scan_is_used_on_request_and_latecomers_are_told(ros1: Lab) -> None:
-    watcher = ros1.watch("amcl_pose")
+    watcher = ros1.watch("amcl_pose", "particle_cloud")
     ros1.node("_mode:=full")
     robot = ros1.robot("stand")
     watcher.wait_for("amcl_pose")
 
-    def beliefs() -> list[list[float]]:
-        return [line["covariance"] for line in watcher.lines("amcl_pose")[-5:]]
+    def clouds() -> list[list[list[float]]]:
+        return [line["places"] for line in watcher.lines("particle_cloud")[-3:]]
 
     wait_until(
-        lambda: len(beliefs()) == 5 and all(a == b for a, b in pairwise(beliefs())),
+        lambda: len(clouds()) == 3 and all(a == b for a, b in pairwise(clouds())),
         lambda: "a filter that updates at rest",
     )
-    at_rest = beliefs()[-1]
+    at_rest = clouds()[-1]
     robot.tell(ask="request_nomotion_update")
-    wait_until(lambda: beliefs()[-1] != at_rest, lambda: "no update of the filter")
+    wait_until(lambda: clouds()[-1] != at_rest, lambda: "no update of the filter")
 
     # Also when the robot has fallen silent.
     robot.end()
