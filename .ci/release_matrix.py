@@ -40,7 +40,7 @@ def main() -> int:
         "uv", path=os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
     )
     if uv is None:
-        sys.exit("expected uv beside this Python or on PATH: pip install uv")
+        sys.exit("expected uv next to this Python or on PATH: pip install uv")
     rows, failed = [], 0
     for name in os.environ.get("PYTHONS", NAMES).split():
         version = _version(name)
@@ -106,14 +106,14 @@ def _try(uv: str, name: str, resolution: str, wheel: Path, venv: Path) -> tuple[
     done = subprocess.run(smoke, capture_output=True, text=True, check=False, cwd=venv)
     if done.returncode:
         return ["-"] * 2 + [f"{size / 2**20:.0f}"] + ["-"] * 3 + ["no"], done.stdout + done.stderr
-    told = json.loads(done.stdout.splitlines()[-1])
+    measured = json.loads(done.stdout.splitlines()[-1])
     return [
-        told["numpy"],
-        told["numba"],
+        measured["numpy"],
+        measured["numba"],
         f"{size / 2**20:.0f}",
-        f"{told['import_ms']:.1f}",
-        f"{told['cold_s']:.1f}",
-        f"{told['warm_s']:.1f}",
+        f"{measured['import_ms']:.1f}",
+        f"{measured['cold_s']:.1f}",
+        f"{measured['warm_s']:.1f}",
         "yes",
     ], ""
 

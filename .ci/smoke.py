@@ -1,4 +1,4 @@
-"""Tries an installed firstfix, and prints what it found as a line of JSON.
+"""Test an installed firstfix, and print the figures as a line of JSON.
 
 Run by the Python of the environment, outside the checkout. Everything through the installed
 command, as a user would; only the tiny map and its scan are made from Python.
@@ -36,8 +36,8 @@ assert "numpy" not in sys.modules
 PROGRAM = Path(sys.executable).parent / "firstfix"
 
 
-def said(*command: str | Path) -> str:
-    """Return what a command says; anything but success is an error."""
+def output_of(*command: str | Path) -> str:
+    """Return the output of a command; a failure is an error."""
     done = subprocess.run(
         [str(part) for part in command], capture_output=True, text=True, check=False
     )
@@ -47,9 +47,9 @@ def said(*command: str | Path) -> str:
 
 
 def timed(*command: str | Path) -> tuple[str, float]:
-    """Return what a command says, and the processor time it took: others may be busy here."""
+    """Return the output of a command, and its processor time."""
     before = os.times()
-    answer = said(*command)
+    answer = output_of(*command)
     after = os.times()
     return answer, sum(after[2:4]) - sum(before[2:4])
 
@@ -59,22 +59,22 @@ def main() -> None:
     os.chdir(tempfile.mkdtemp(prefix="firstfix-smoke-"))
     os.environ["FIRSTFIX_CACHE_DIR"] = str(Path("cache").resolve())
     version = importlib.metadata.version("firstfix")
-    assert said(PROGRAM, "--version").split() == ["firstfix", version]
+    assert output_of(PROGRAM, "--version").split() == ["firstfix", version]
     for command in ("locate", "track", "map", "bench", "demo", "serve", "doctor"):
-        assert "--help" in said(PROGRAM, command, "--help")
-    import_s = min(float(said(sys.executable, "-c", IMPORT)) for _ in range(5))
+        assert "--help" in output_of(PROGRAM, command, "--help")
+    import_s = min(float(output_of(sys.executable, "-c", IMPORT)) for _ in range(5))
 
-    said(sys.executable, "-c", MAKE)
+    output_of(sys.executable, "-c", MAKE)
     _, cold_s = timed(PROGRAM, "locate", "map.yaml", "scan.npz", "--json")
     answer, warm_s = timed(PROGRAM, "locate", "map.yaml", "scan.npz", "--json")
     found = json.loads(answer)
     assert found["verdict"] == "UNIQUE"
     assert math.dist(found["pose"], WHERE) < 0.05
 
-    doctor = said(PROGRAM, "doctor")
+    doctor = output_of(PROGRAM, "doctor")
     assert "ready after" in doctor
-    said(sys.executable, "-c", "import firstfix.web.server")
-    said(PROGRAM, "demo", "--headless")
+    output_of(sys.executable, "-c", "import firstfix.web.server")
+    output_of(PROGRAM, "demo", "--headless")
     figures = {"import_ms": 1e3 * import_s, "cold_s": cold_s, "warm_s": warm_s}
     for package in ("numpy", "numba"):
         figures[package] = importlib.metadata.version(package)

@@ -1,6 +1,6 @@
-"""Does the truth win? Start the filter on all hypotheses of the static stage, and drive 5 m.
+"""Start the filter on all hypotheses of the static stage, drive 5 m, and count right poses.
 
-Starts are scans of drives whose verdict is AMBIGUOUS and whose hypotheses hold the truth; with
+Starts are scans of drives whose verdict is AMBIGUOUS and whose hypotheses contain the truth; with
 --all those of any verdict. The filter begins on the hypotheses in proportion to their
 probabilities, on all of them alike, at the truth, or all over free space (the same settings, Nav2's
 defaults, and random numbers). A line has the number of starts, and of those that are within 0.5 m

@@ -2,7 +2,7 @@
 
 Every update starts from the same belief around a true pose: odometry of 0.25 m, one scan, all
 particles resampled. Prints processor time in ms, median over the runs (and the fastest run), the
-sensor model in ns per particle and beam, beside a NumPy twin that gives the same numbers; and the
+sensor model in ns per particle and beam, next to a NumPy version with the same results; and the
 memory of the largest filter over that of the process before.
 
     python benchmarks/amcl.py ../shared/cases/willow_track_00 [--runs 200]

@@ -68,7 +68,7 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=40.0, help="scans a second")
     parser.add_argument("--beams", type=int, default=720)
     parser.add_argument("--runs", type=int, default=5, help="how often the robot is found anew")
-    parser.add_argument("--cloud", action="store_true", help="somebody looks at the particles")
+    parser.add_argument("--cloud", action="store_true", help="subscribe to the particles")
     options = parser.parse_args()
     grid = load_map(options.map) if options.map else WORLDS["office"]()
     robot = Robot(grid, options.beams, options.rate)

@@ -1,10 +1,10 @@
-"""How should the beams of a scan be combined? Follow drives with several answers, side by side.
+"""How should the beams of a scan be combined? Track drives with several rules, side by side.
 
 The filter is the same in all columns, and so are seed, start and settings (Nav2's defaults); only
-the likelihood of a scan is made otherwise of those of its beams: the product counted as 8, 15, 30
-or 60 effective beams (firstfix: 15), and AMCL's one plus the sum of cubes. A line has, for
+the likelihood of a scan differs: the product over beams, scaled to 8, 15, 30 or 60 effective
+beams (firstfix: 15), or one plus the sum of cubes (AMCL). A line has, for
 each: APE RMSE (m), share of scans kept (0.5 m, 10 degrees), and share of updates whose truth lies
-within the 3-sigma ellipsoid of the estimate, which an honest belief holds in 97 %.
+within the 3-sigma ellipsoid of the estimate, which a consistent estimate contains in 97 %.
 
     python benchmarks/effective_beams.py ../shared/cases/*/ [--seeds 2]
 """

@@ -1,7 +1,7 @@
-"""Where should new particles come from when the belief stops fitting? Kidnap drives and see.
+"""Where should new particles come from after a loss? Recovery from kidnaps on drives.
 
-Each drive is followed for 15 s; then the robot is carried, unseen by odometry, to where the drive
-is 20 s later, and followed to its end, at most 30 s. Recovery is on (recovery_alpha_slow 0.001,
+Each drive is tracked for 15 s. Then the robot is teleported to the pose of the drive 20 s later and
+tracked to the end, at most 30 s. Recovery is on (recovery_alpha_slow 0.001,
 recovery_alpha_fast 0.1). Injected are poses from free space (as AMCL does), or of the static
 stage's hypotheses for the scan. A line has, for each and for no injection at all: the share of
 drives that end within 0.5 m and 10 degrees of the truth, and the median time until they are, for

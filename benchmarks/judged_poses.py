@@ -1,4 +1,4 @@
-"""How well does the cost of a pose tell right from wrong? Judge true and random poses.
+"""How well does the cost of a pose separate right from wrong? Cost of true and random poses.
 
 For each case, scans evenly chosen: the cost of the true pose, of a random pose, and of the best
 pose within a metre of the random one (where a filter that was kidnapped might settle); percentiles

@@ -54,7 +54,7 @@ def scans(count: int) -> list[tuple[SE2, LaserScan]]:
 
 
 def serve(pipe: Connection) -> None:
-    """Show frames until told to end; answer every word with CPU time and memory so far."""
+    """Show frames until the end; answer each request with CPU time and memory so far."""
     grid, placed = office(), scans(POSES)
     store = SnapshotStore("office")
     localizer: Any = SimpleNamespace(matcher=ScanMatcher(grid), particles=None, belief=None)
@@ -100,7 +100,7 @@ def rss_mb() -> float:
 
 
 def watch(url: str, viewers: int, seconds: float, pipe: Connection) -> None:
-    """Look on with so many viewers; tell how many frames came, and how late."""
+    """Connect viewers; return the number of frames and their delays."""
     from websockets.asyncio.client import connect
 
     late_s: list[float] = []

@@ -1,10 +1,10 @@
 """Time the node of ROS 1 on a real master: to initialpose at first, to amcl_pose for long.
 
 The node is a process of its own, as users start it, with its kernels and its map ready. First, a
-robot is found at many random places of the map: after the service that makes the node forget, one
-scan is sent, and the answer timed. Then a robot drives in circles, as fast as a Kobuki; odometry
-and scan of one time are sent together, so that nothing has to be waited for. A time is from before
-a scan is sent to after the answer has arrived. Prints one line a measurement.
+robot is localized at many random places of the map: after the service that restarts the search, one
+scan is sent, and the answer is timed. Then a robot drives in circles, as fast as a Kobuki; odometry
+and scan of one time are sent together. A time is from before a scan is sent to after the answer has
+arrived. Prints one line per measurement.
 
     python benchmarks/ros1_latency.py ../shared/maps/navigation_tutorials__willow-full-0.05.yaml \
         [--seconds 600] [--places 40] [--beams 720] [--rate 40]
@@ -72,7 +72,7 @@ def main() -> None:
 
 
 class Robot:
-    """What publishes, and hears when a pose of which stamp arrives."""
+    """Publishes, and records the time of arrival and the stamp of each pose."""
 
     def __init__(self, grid: OccupancyGrid, beams: int) -> None:
         rospy.init_node("robot", disable_signals=True)
@@ -145,7 +145,7 @@ def find(lab: Lab, robot: Robot, places: int) -> None:
     first, *_ = taken
     print(
         f"first scan to initialpose  the very first {first:.0f} ms; median {np.median(taken):.0f}, "
-        f"worst {max(taken):.0f} ms of {len(taken)} places; {untold} told as ambiguous"
+        f"worst {max(taken):.0f} ms of {len(taken)} places; {untold} ambiguous"
     )
 
 

@@ -1,12 +1,12 @@
-"""Let the whole system live for half an hour while everything that can happen to it happens.
+"""Run the whole system for half an hour while faults of every kind occur.
 
 A real roscore; a simulated robot in a process of its own, which drives about in a built-in
-building; the node with its live page, as users start it; a viewer of the page; and an observer, who
-writes down what the node publishes. A seeded script lets people come, scans and odometry be
-dropped, held back and late, clocks jump, the robot be kidnapped, the node be frozen; and it kills
-and restarts each of the processes, or all at once. In the first half the node is not killed, so
-that its memory can be seen to grow. Afterwards each pose that was published is compared with the
-truth, see `soak_judged`.
+building; the node with its live page, as users start it; a viewer of the page; and an observer that
+records what the node publishes. A seeded script adds people, drops, holds and delays scans and
+odometry, sets clocks, kidnaps the robot and suspends the node; it also kills and restarts each of
+the processes, or all of them. In the first half the node is not killed, so that growth of its
+memory is visible. Afterwards each published pose is compared with the ground truth, see
+`soak_judged`.
 
     python benchmarks/soak.py [--minutes 30] [--seed 1] [--world office] [--mode full]
         [--report benchmarks/reports/DATE/soak]
@@ -44,11 +44,11 @@ from firstfix.lab.worlds.catalog import WORLDS
 
 SENSORS = ["scan", "/tf"]
 HOUR_S = 3600.0
-# Kernels may have to be compiled first.
+# Includes compilation.
 PATIENCE_S = 300.0
-# From the end of a fault to the next: most have a calm time after them, some have none.
+# Time from the end of a fault to the next one: mostly calm, sometimes none.
 CALM_S, CALM_AFTER_A_KILL_S, HASTE_S, HASTE = (6.0, 10.0), (10.0, 15.0), 0.3, 0.15
-# A node that is not killed for so much of the time has a memory to look at.
+# The node is not killed during this share of the time, so its memory can be judged.
 FIRST_LIFE = 0.5
 _TICK_S = 0.05
 
@@ -68,7 +68,7 @@ class Soak:
         self.began = self.ended = 0.0
 
     def run(self, minutes: float) -> None:
-        """Live through it."""
+        """Run the script against the system."""
         self._begin()
         self.began, end = time.time(), time.time() + 60.0 * minutes
         script = self._script(end)
@@ -100,7 +100,7 @@ class Soak:
         return whole_lines(self._system.said)
 
     def _script(self, end: float) -> Iterator[Callable[[], tuple[str, float]]]:
-        """Yield all that can happen, each as often as the others, in another order each time."""
+        """Yield every fault equally often, in another order each time."""
         quiet_until = self.began + FIRST_LIFE * (end - self.began)
         while True:
             for i in self._rng.permutation(len(HAPPENINGS)):
@@ -109,7 +109,7 @@ class Soak:
                     yield lambda happening=happening: happening(self)
 
     def _inject(self, happening: Callable[[], tuple[str, float]]) -> float:
-        """Let something happen; return when the next thing may."""
+        """Cause a fault; return the time of the next one."""
         begin = time.time()
         kind, seconds = happening()
         self.faults.append({"kind": kind, "begin": begin, "end": begin + seconds})
@@ -133,47 +133,47 @@ class Soak:
     def _between(self, least: float, most: float) -> float:
         return float(self._rng.uniform(least, most))
 
-    # ---- what can happen: each returns what it is called, and how long it lasts
+    # ---- faults: each returns its name and duration
 
     def people_walk(self) -> tuple[str, float]:
-        """Let people walk about, from now on until others come."""
+        """Replace the people by some who walk."""
         self._system.tell(do="people", count=int(self._rng.integers(3, 10)), manner="walk")
         return "people walk", 0.0
 
     def people_crowd(self) -> tuple[str, float]:
-        """Let people stand around the robot and go with it."""
+        """Surround the robot by people who move with it."""
         self._system.tell(do="people", count=int(self._rng.integers(2, 6)), manner="surround")
         seconds = self._between(4.0, 10.0)
         self._later(seconds, lambda: self._system.tell(do="people", count=2, manner="walk"))
         return "a crowd", seconds
 
     def scans_dropped(self) -> tuple[str, float]:
-        """Silence the sensor."""
+        """Drop all scans."""
         return "scans dropped", self._wire("drop", ["scan"], self._between(1.0, 6.0))
 
     def odometry_dropped(self) -> tuple[str, float]:
-        """Silence the wheels."""
+        """Drop all odometry."""
         return "odometry dropped", self._wire("drop", ["/tf"], self._between(1.0, 6.0))
 
     def silence(self) -> tuple[str, float]:
-        """Silence the robot."""
+        """Drop all messages of the robot."""
         return "all dropped", self._wire("drop", SENSORS, self._between(1.0, 6.0))
 
     def burst(self) -> tuple[str, float]:
-        """Let a second of scans and odometry come at once."""
+        """Hold scans and odometry for a second, then deliver them at once."""
         return "burst of all", self._wire("hold", SENSORS, self._between(0.8, 2.0))
 
     def burst_of_scans(self) -> tuple[str, float]:
-        """Let a second of scans come at once."""
+        """Hold scans for a second, then deliver them at once."""
         return "burst of scans", self._wire("hold", ["scan"], self._between(0.8, 2.0))
 
     def odometry_late(self) -> tuple[str, float]:
-        """Let odometry come later than its scans."""
+        """Delay odometry behind its scans."""
         delay_s = self._between(0.1, 0.8)
         return "odometry late", self._wire("late", ["/tf"], self._between(3.0, 6.0), delay_s)
 
     def scans_late(self) -> tuple[str, float]:
-        """Let scans come later than their odometry."""
+        """Delay scans behind their odometry."""
         delay_s = self._between(0.1, 0.8)
         return "scans late", self._wire("late", ["scan"], self._between(3.0, 6.0), delay_s)
 
@@ -183,7 +183,7 @@ class Soak:
         return seconds + delay_s
 
     def clock_ahead(self) -> tuple[str, float]:
-        """Set the clock of the robot ahead."""
+        """Set the clock of the robot forward."""
         by = self._rng.choice([self._between(0.1, 2.0), self._between(2.0, 60.0), HOUR_S])
         self._system.tell(do="clock", by=float(by))
         return "clock ahead", 0.0
@@ -195,40 +195,40 @@ class Soak:
         return "clock back", 0.0
 
     def kidnap(self) -> tuple[str, float]:
-        """Put the robot elsewhere; nothing tells of it."""
+        """Teleport the robot; no sensor reports it."""
         self._system.tell(do="teleport")
         return "silent kidnap", 0.0
 
     def carry(self) -> tuple[str, float]:
-        """Carry the robot off; its wheels tell of it."""
+        """Carry the robot elsewhere; the wheel drop reports it."""
         seconds = self._between(2.0, 5.0)
         self._system.tell(do="carry", seconds=seconds)
         return "carried off", seconds
 
     def push(self) -> tuple[str, float]:
-        """Kick the robot."""
+        """Push the robot; odometry does not measure it."""
         degrees = self._between(-40.0, 40.0)
         self._system.tell(do="push", metres=self._between(0.2, 0.8), degrees=degrees)
         return "pushed", 0.5
 
     def wrong_hint(self) -> tuple[str, float]:
-        """Say as a person where the robot is, and be wrong."""
+        """Publish a wrong hint."""
         self._system.tell(do="hint")
         return "wrong hint", 0.0
 
     def freeze(self) -> tuple[str, float]:
-        """Give the node no processor for a while."""
+        """Suspend the node for a while."""
         node, seconds = self._system.parts["node"], self._between(1.0, 4.0)
         node.send(signal.SIGSTOP)
         self._later(seconds, lambda: node.send(signal.SIGCONT))
         return "node frozen", seconds
 
     def kill_node(self) -> tuple[str, float]:
-        """Kill the node; it comes back."""
+        """Kill and restart the node."""
         return "kill node", self._kill("node", self._system.start_node)
 
     def kill_node_and_kidnap(self) -> tuple[str, float]:
-        """Carry the robot off while nobody listens."""
+        """Carry the robot elsewhere while the node is not running."""
         seconds = self._kill("node", self._system.start_node)
         self._system.tell(do="teleport")
         return "kill node, kidnap meanwhile", seconds
@@ -242,26 +242,26 @@ class Soak:
         return "kill node, saved pose cut", seconds
 
     def kill_robot(self) -> tuple[str, float]:
-        """Restart the robot's computer; its odometry begins anew."""
+        """Restart the robot's computer; odometry starts at zero."""
         return "kill robot", self._kill("robot", self._restart_robot)
 
     def kill_robot_and_carry(self) -> tuple[str, float]:
-        """Carry the robot off while its computer is restarted."""
+        """Carry the robot elsewhere while its computer restarts."""
         return "kill robot, kidnap meanwhile", self._kill("robot", self._restart_robot_elsewhere)
 
     def kill_viewer(self) -> tuple[str, float]:
-        """Let the viewer's browser crash."""
+        """Kill the viewer."""
         return "kill viewer", self._kill("viewer", self._system.start_viewer)
 
     def kill_roscore(self) -> tuple[str, float]:
-        """Kill the master of ROS; it comes back."""
+        """Kill and restart the ROS master."""
         seconds = self._between(0.5, 4.0)
         self._system.core.kill()
         self._later(seconds, self._system.core.start)
         return "kill roscore", seconds
 
     def kill_all(self) -> tuple[str, float]:
-        """Let the power fail: master, node and robot begin anew."""
+        """Kill and restart master, node and robot."""
         self._system.core.kill()
         self._later(0.5, self._system.core.start)
         seconds = self._kill("node", self._system.start_node)

@@ -1,9 +1,9 @@
-"""What became of a soak: each pose against the truth, and figures of time, memory and complaints.
+"""Results of a soak: each pose against the ground truth; time, memory and log messages.
 
-A pose is *right* within 0.5 m and 10 degrees of where the robot truly was at the stamp of its scan.
-One that is not is *stale* if somebody has just moved the robot and the pose only goes on from the
-last right one by odometry, up to `STALE_S` after the robot stood still again: nobody has noticed
-yet. Anything else is *wrong*: a leap to a wrong place, or one that is held for longer.
+A pose is *right* within 0.5 m and 10 degrees of the true pose at the stamp of its scan. Another
+pose is *stale* if the robot was just moved and the pose continues the last right one by odometry,
+up to `STALE_S` after the robot stands again: the kidnap is not detected yet. All others are
+*wrong*: a jump to a wrong place, or a stale pose that is kept for longer.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from firstfix.core.se2 import SE2
 
 RIGHT_M, RIGHT_DEG = 0.5, 10.0
 STALE_S = 5.0
-# A stale pose goes on from the one before, but for what the filter makes of scans that do not fit.
+# A stale pose continues the one before, within what the filter changes on scans that do not fit.
 _STEP_M, _STEP_RAD = 0.35, math.radians(15.0)
-# Nothing of a fault is left so long after it, s.
+# Time after which a fault has no effect any more, s.
 _SETTLED_S = 3.0
-# Scans that were sent so shortly before a fault, s, may be answered after it.
+# Scans sent this short a time before a fault, s, may be answered after it.
 _ON_THE_WAY_S = 0.5
 _TOLERANCE_S = 1.0  # by which map -> odom is dated ahead
-_ORDER_S = 1.0  # within which a robot does as it is told
+_ORDER_S = 1.0  # within which a robot executes a command
 
 Row = dict[str, Any]
 
@@ -41,7 +41,7 @@ def judge(record: Row) -> Row:
     Parameters
     ----------
     record : dict
-        What `soak.py` wrote down.
+        The record of `soak.py`.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def judge(record: Row) -> Row:
 
 
 class Truth:
-    """Where the robot was at each scan that it sent, and when somebody moved it."""
+    """True poses at the scans that were sent, and the times when the robot was moved."""
 
     def __init__(self, rows: list[Row]) -> None:
         self.scans = [row for row in rows if row["kind"] == "scan"]
@@ -107,12 +107,12 @@ class Truth:
         )
 
     def last_move(self, made: float) -> Row | None:
-        """Return what was last done to the robot before a scan was taken."""
+        """Return the last disturbance before a scan was taken."""
         return next((row for row in reversed(self.moved) if row["at"] <= made + 1e-3), None)
 
 
 class Judged:
-    """The poses of one topic, in the order in which they came."""
+    """The poses of one topic, in the order of arrival."""
 
     def __init__(self, truth: Truth, said: list[Row], topic: str) -> None:
         self.rows: list[Row] = []
@@ -146,7 +146,7 @@ class Judged:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many are what."""
+        """Return the number of poses of each verdict."""
         counted = Counter(row["verdict"] for row in self.rows)
         return {name: counted[name] for name in ("right", "stale", "wrong")} | {
             "of no known scan": self.unknown
@@ -154,7 +154,7 @@ class Judged:
 
     @property
     def wrong(self) -> list[Row]:
-        """Those that nothing excuses."""
+        """The wrong poses."""
         return [row for row in self.rows if row["verdict"] == "wrong"]
 
 
@@ -165,29 +165,29 @@ def errors(row: Row) -> tuple[float, float]:
 
 
 def verdict(row: Row, before: Row | None) -> str:
-    """Judge a pose, knowing the one before."""
+    """Judge a pose, given the one before."""
     metres, degrees = errors(row)
     if metres <= RIGHT_M and degrees <= RIGHT_DEG:
         return "right"
     move = row["move"]
     if move is None or before is None or row["made"] > move["until"] + STALE_S:
         return "wrong"
-    # The pose before was right until then, or was itself one that nobody had noticed.
+    # The pose before was right until then, or was itself stale.
     was_fine = before["verdict"] == "stale" or before["verdict"] == "right"
     return "stale" if was_fine and goes_on(before, row) else "wrong"
 
 
 def goes_on(before: Row, row: Row) -> bool:
-    """Tell whether a pose is only the one before, carried on by odometry."""
+    """Return whether a pose continues the one before by odometry."""
     expected = before["pose"]
-    if before["life"] == row["life"]:  # else odometry began anew
+    if before["life"] == row["life"]:  # else odometry was restarted
         expected = expected @ (before["odom"].inverse() @ row["odom"])
     turned = angle_error(expected.yaw, row["pose"].yaw)
     return expected.distance_to(row["pose"]) <= _STEP_M and turned <= _STEP_RAD
 
 
 def wrong(row: Row, began: float) -> Row:
-    """Say what is wrong with a pose, for people."""
+    """Describe a wrong pose."""
     metres, degrees = errors(row)
     move = row["move"]
     return {
@@ -204,7 +204,7 @@ def wrong(row: Row, began: float) -> Row:
 
 
 def stale(truth: Truth, main: Judged, began: float) -> list[Row]:
-    """List, for each time that the robot was moved, how long the old pose was believed."""
+    """List, for each time that the robot was moved, how long the old pose was published."""
     listed = []
     for move in truth.moved:
         own = [r["made"] for r in main.rows if r["verdict"] == "stale" and r["move"] is move]
@@ -237,7 +237,7 @@ def recoveries(faults: list[Row], truth: Truth, main: Judged) -> list[Row]:
 
 
 def by_kind(faults: list[Row]) -> list[Row]:
-    """Put faults of one kind together."""
+    """Group faults by kind."""
     kinds: dict[str, list[Row]] = defaultdict(list)
     for fault in faults:
         kinds[fault["kind"]].append(fault)
@@ -254,7 +254,7 @@ def by_kind(faults: list[Row]) -> list[Row]:
 
 
 def calm(faults: list[Row], ended: float) -> list[tuple[float, float]]:
-    """Return the times in which nothing happens, and what has happened is over."""
+    """Return the times without a fault and without the effects of one."""
     spans = []
     for fault, after in zip(faults, [*faults[1:], None], strict=True):
         if fault["in_time"]:
@@ -264,7 +264,7 @@ def calm(faults: list[Row], ended: float) -> list[tuple[float, float]]:
 
 
 def inside(at: float, spans: list[tuple[float, float]]) -> bool:
-    """Tell whether a time is in one of the spans."""
+    """Return whether a time is in one of the spans."""
     i = bisect_left(spans, (at, math.inf)) - 1
     return i >= 0 and spans[i][0] <= at <= spans[i][1]
 
@@ -279,13 +279,13 @@ def answered(truth: Truth, main: Judged, quiet: list[tuple[float, float]]) -> Ro
 
 
 def right_share(truth: Truth, main: Judged) -> float:
-    """Return for which share of all scans that were sent a right pose was published."""
+    """Return the fraction of all sent scans with a right published pose."""
     right = sum(row["verdict"] == "right" for row in main.rows)
     return right / max(1, len(truth.scans))
 
 
 def spread(values: Iterable[float | None]) -> Row | None:
-    """Return median, p99 and the greatest of what is known; None if nothing is."""
+    """Return median, p99 and maximum of the known values; None if there is none."""
     known = [value for value in values if value is not None]
     if not known:
         return None
@@ -294,7 +294,7 @@ def spread(values: Iterable[float | None]) -> Row | None:
 
 
 def page(record: Row, truth: Truth, quiet: list[tuple[float, float]]) -> Row:
-    """Say what a viewer of the page got, and what it missed."""
+    """Return which frames a viewer of the page received, and which it missed."""
     seen = [row for row in record["seen"] if row["at"] >= record["began"]]
     states = [row for row in seen if row["what"] == "state"]
     at = [row["at"] for row in states]

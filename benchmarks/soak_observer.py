@@ -1,4 +1,4 @@
-"""The observers of `soak.py`: what a node of ROS 1 says, and what its page shows, as lines of JSON.
+"""The observers of `soak.py`: messages of a ROS 1 node and of its page, as lines of JSON.
 
 python benchmarks/soak_observer.py ros FILE
 python benchmarks/soak_observer.py page FILE WEBSOCKET_URL
@@ -41,7 +41,7 @@ class Lines:
 
 
 def listen(lines: Lines) -> None:
-    """Write down what the node publishes, and nobody else."""
+    """Record what the node publishes, and no other node."""
     import rospy
     from soak_robot import stay_known
 
@@ -72,7 +72,7 @@ def listen(lines: Lines) -> None:
 
 
 async def look(lines: Lines, url: str) -> None:
-    """Write down what the page is told, and connect again whenever it is cut off."""
+    """Record what the page receives; reconnect after an interruption."""
     from websockets.asyncio.client import connect
     from websockets.exceptions import WebSocketException
 
@@ -89,7 +89,7 @@ async def look(lines: Lines, url: str) -> None:
 
 
 def see(lines: Lines, message: dict[str, Any]) -> None:
-    """Write down a message of the page."""
+    """Record a message to the page."""
     what, at = message["type"], time.time()
     if what == "state":
         lines.write(what=what, at=at, stamp=message["stamp"], state=message["state"])

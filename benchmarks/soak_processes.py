@@ -1,4 +1,4 @@
-"""Figures of the processes of a soak: memory, processor, complaints."""
+"""Figures of the processes of a soak: memory, processor time, log messages."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-# A shorter life says nothing of how memory grows, s.
+# Shorter lives do not show growth of memory, s.
 _LONG_LIFE_S = 300.0
 
 Row = dict[str, Any]
 
 
 def lives(samples: list[Row], who: str, began: float) -> list[Row]:
-    """Return what became of memory, threads and files in each life of a process, in its order."""
+    """Return memory, threads and files over each life of a process, in order."""
     grouped: dict[int, list[Row]] = defaultdict(list)
     for sample in samples:
         if sample["who"] == who:
@@ -55,7 +55,7 @@ def memory_of_lives(samples: list[Row], began: float) -> list[list[tuple[float, 
 
 
 def parts(samples: list[Row]) -> list[Row]:
-    """Return the processor that each process took, as a share of a core, and its memory."""
+    """Return the processor time of each process, as a fraction of a core, and its memory."""
     found = []
     for who in sorted({sample["who"] for sample in samples}):
         own = [sample for sample in samples if sample["who"] == who]
@@ -64,7 +64,7 @@ def parts(samples: list[Row]) -> list[Row]:
 
 
 def cpu(samples: list[Row]) -> float:
-    """Return the processor time of successive lives as a share of a core."""
+    """Return the processor time of successive lives as a fraction of a core."""
     used = passed = 0.0
     for a, b in itertools.pairwise(samples):
         if a["pid"] == b["pid"]:
@@ -78,10 +78,10 @@ _COLOUR = re.compile(r"\x1b\[[\d;]*m")
 
 
 def log(logs: list[list[str]]) -> list[Row]:
-    """Count what processes said, but for what is only for information."""
+    """Count the log messages of the processes, without those of level INFO."""
     counted: Counter[tuple[str, str, str]] = Counter()
     for who, text in logs:
-        # Where this machine has its files is nobody's business.
+        # Paths of this machine do not belong in a report.
         for line in _FOLDERS.sub("", _COLOUR.sub("", text)).splitlines():
             found = _SAID.match(line.strip())
             level, said = found.groups() if found else ("", line.strip())
@@ -97,5 +97,5 @@ def log(logs: list[list[str]]) -> list[Row]:
 
 
 def without_numbers(text: str) -> str:
-    """Let sentences be the same that differ in a number only."""
+    """Replace numbers, so that messages that differ only in numbers are equal."""
     return re.sub(r"\d+(\.\d+)?(e[+-]?\d+)?", "N", text)

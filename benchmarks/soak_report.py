@@ -86,7 +86,7 @@ def _sections(figures: Row) -> list[str]:
             f"A simulated Kobuki in the built-in `{settings['world']}`, over a real roscore; "
             f"`firstfix serve --robot ros1` in mode `{settings['mode']}`; a viewer of its page. "
             f"Right: within {RIGHT_M:g} m and {RIGHT_DEG:g} degrees at the stamp of the scan. "
-            "Stale: somebody has just moved the robot, and the pose goes on from the last right "
+            "Stale: the robot was just moved, and the pose continues the last right "
             f"one by odometry, for {STALE_S:g} s at most. Wrong: anything else."
         ),
         "![memory, lag and faults over time](soak.png)",
@@ -100,7 +100,7 @@ def _sections(figures: Row) -> list[str]:
         "## The node's memory",
         columns_table(figures["memory"], {}, _LIVES).rstrip(),
         _processes(figures),
-        "## What was said in the logs",
+        "## Log messages",
         _log(figures),
         "## Minute by minute",
         _minutes(figures),

@@ -1,9 +1,8 @@
-"""The robot of `soak.py`: a simulated Kobuki over rospy, to whom things happen in real time.
+"""The robot of `soak.py`: a simulated Kobuki over rospy, with disturbances in real time.
 
-A line of JSON on its stdin says what: ``{"do": "drop", "topics": ["scan"], "seconds": 3}``; the
-methods of `Robot` named ``do_...`` are all that can happen. Into its file it writes a line for each
-scan that it sends (where it truly was, what its wheels said, when it was sent), and for each time
-that somebody moved it.
+A line of JSON on its stdin is a command: ``{"do": "drop", "topics": ["scan"], "seconds": 3}``; the
+methods of `Robot` named ``do_...`` are the commands. The file gets a line for each scan that is
+sent (true pose, odometry, time of sending), and for each time that the robot is moved.
 """
 
 from __future__ import annotations
@@ -42,14 +41,14 @@ from firstfix.lab.worlds.catalog import WORLDS, random_free_pose
 from firstfix.ros.ros1.master import is_forgotten, register_anew
 from firstfix.ros.ros1.types import make, message_class
 
-# Whoever is carried off is no longer where it was.
+# A carried robot must end up at least this far away.
 FAR_M = 2.0
 _MASTER_CHECK_S = 1.0
 _SENSORS = ("scan", "/tf", "/tf_static", "events/cliff", "events/wheel_drop", "events/bumper")
 
 
 def stay_known() -> None:
-    """Register again with every new master, in a thread: rospy does not notice it."""
+    """Register again with every new master, in a thread: rospy does not detect it."""
 
     def look() -> None:
         is_known = True
@@ -62,7 +61,7 @@ def stay_known() -> None:
 
 
 class Wire:
-    """Between the robot and ROS: it drops, holds back and delays, but never reorders a topic."""
+    """Connection of the robot to ROS: drops, holds and delays messages; never reorders a topic."""
 
     def __init__(self) -> None:
         self._publishers = {
@@ -82,11 +81,11 @@ class Wire:
         self.told: Any = None
 
     def trouble(self, kind: str, topics: list[str], seconds: float, delay_s: float = 0.0) -> None:
-        """From now on so long: ``drop``, ``hold`` (all comes at once at the end) or ``late``."""
+        """Start a fault: ``drop``, ``hold`` (all messages at once at the end) or ``late``."""
         self._troubles.append((kind, topics, time.time() + seconds, delay_s))
 
     def send(self, topic: str, message: Any, row: Any) -> None:
-        """Send a message, or what becomes of it; ``row`` is written when it really goes."""
+        """Send, delay or drop a message; ``row`` is written when it is sent."""
         now = due = time.time()
         self._troubles = [trouble for trouble in self._troubles if trouble[2] > now]
         for kind, topics, until, delay_s in self._troubles:
@@ -100,7 +99,7 @@ class Wire:
         self.deliver()
 
     def deliver(self) -> None:
-        """Let go what is due."""
+        """Send the delayed messages that are due."""
         while self._kept and self._kept[0][0] <= time.time():
             _, _, topic, message, row = heapq.heappop(self._kept)
             if rospy.is_shutdown():
@@ -119,7 +118,7 @@ class Wire:
 
 
 class Robot:
-    """A Kobuki in a building, and what is done to it."""
+    """A Kobuki in a building, with disturbances."""
 
     def __init__(self, grid: OccupancyGrid, start: SE2 | None, seed: int, lines: Any) -> None:
         self._grid = grid
@@ -128,7 +127,7 @@ class Robot:
         is_elsewhere = False
         try:
             self._simulation = self._wake(start, seed)
-        except InputError:  # it died where it cannot stand, such as in somebody's hands
+        except InputError:  # it was killed at an invalid pose, such as while it was carried
             self._simulation, is_elsewhere = self._wake(None, seed), True
         self._plot: Iterator[Moment] = iter(())
         self._wire = Wire()
@@ -139,7 +138,7 @@ class Robot:
         self._life = f"{seed}"
         self._clock_s = 0.0
         self._orders: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
-        next(Stand(1.0).play(self._wake(None, seed)))  # kernels are loaded before time begins
+        next(Stand(1.0).play(self._wake(None, seed)))  # loads kernels before the clock starts
         if is_elsewhere:
             self._mark("teleport")
 
@@ -147,12 +146,12 @@ class Robot:
         return start_simulation(Scenario((), start=start), self._grid, seed)
 
     def listen(self) -> None:
-        """Take orders from stdin, in a thread."""
+        """Read commands from stdin, in a thread."""
         for line in sys.stdin:
             self._orders.put(json.loads(line))
 
     def live(self) -> None:
-        """Live, in real time, until ROS ends it."""
+        """Run in real time until ROS ends it."""
         T_base_laser = Scenario(()).lidar.T_base_laser
         self._wire.send("/tf_static", transforms(make, 0.0, BASE, LASER, T_base_laser), None)
         began = time.time() - self._simulation.stamp
@@ -169,7 +168,7 @@ class Robot:
             self._plot = self._wander()
 
     def _wander(self) -> Iterator[Moment]:
-        with suppress(InputError):  # where it was put there may be no way out
+        with suppress(InputError):  # there may be no path from its place
             yield from DriveTo(seconds=90.0).run(self._simulation)
         yield from Stand(1.0).run(self._simulation)
 
@@ -189,7 +188,7 @@ class Robot:
             stamp = to_seconds(message.header.stamp) if own else 0.0
             self._wire.send(topic, message, row | {"stamp": stamp} if own else None)
 
-        # Also of scans that are never sent: where it dies, it comes to life again.
+        # Also for scans that are not sent: a restarted robot continues at its last true pose.
         self._tell({"kind": "here", "pose": row["pose"]})
         for event in moment.events:
             self._wire.wait_until(began + event.stamp)
@@ -209,47 +208,47 @@ class Robot:
             if there.distance_to(here) > FAR_M:
                 return there
 
-    # ---- what can happen
+    # ---- disturbances
 
     def do_wire(self, **trouble: Any) -> None:
-        """Drop messages, hold them or let them be late."""
+        """Drop, hold or delay messages."""
         self._wire.trouble(**trouble)
 
     def do_clock(self, by: float) -> None:
-        """Let its clock jump."""
+        """Set the clock."""
         self._clock_s += by
 
     def do_people(self, count: int, manner: str) -> None:
-        """Let people come instead of those that were there."""
+        """Replace the people."""
         self._simulation.people.come(count, Manner(manner), self._simulation.robot.T_map_base)
 
     def do_teleport(self) -> None:
-        """Be elsewhere; nothing tells of it."""
+        """Teleport; no sensor reports it."""
         self._simulation.robot.place(self._elsewhere())
         self._mark("teleport")
         self._plot = Stand(1.0).run(self._simulation)
 
     def do_carry(self, seconds: float) -> None:
-        """Be lifted, carried and set down; the wheels say so."""
+        """Be lifted, carried and set down; the wheel drop reports it."""
         self._mark("carry", seconds)
         carried = CarryTo(self._elsewhere(), seconds).run(self._simulation)
         self._plot = itertools.chain(carried, Stand(1.0).run(self._simulation))
 
     def do_push(self, metres: float, degrees: float) -> None:
-        """Be kicked; the wheels stand."""
+        """Be pushed; the wheels do not turn."""
         self._mark("push", 0.5)
         pushed = Slip(metres, degrees).run(self._simulation)
         self._plot = itertools.chain(pushed, Stand(1.0).run(self._simulation))
 
     def do_hint(self) -> None:
-        """Let somebody say where it is, who is wrong."""
+        """Publish a wrong hint."""
         where = self._elsewhere()
         covariance = np.diag([0.25, 0.25, 0.07])
         self._person.publish(pose_with_covariance(make, 0.0, "map", where, covariance))
 
 
 def main() -> None:
-    """Live until ended."""
+    """Run until ended."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("world", choices=WORLDS)
     parser.add_argument("seed", type=int)

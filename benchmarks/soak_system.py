@@ -1,4 +1,4 @@
-"""The processes of a soak: how each is started, killed, asked for figures and read."""
+"""The processes of a soak: starting, killing, figures and output of each."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HERE = Path(__file__).parent
 
 
 class Part(Program):
-    """A program of the system, with figures that end with it."""
+    """A program of the system, with figures while it runs."""
 
     @property
     def pid(self) -> int:
@@ -45,7 +45,7 @@ class Part(Program):
 
 
 class Core(Master):
-    """A roscore that can be killed with all its parts, and comes back at the same address."""
+    """A roscore that can be killed with all its parts, and restarts at the same address."""
 
     def kill(self) -> None:
         """End it as a power cut does."""
@@ -73,7 +73,7 @@ def children(pid: int) -> list[int]:
 
 
 class System:
-    """All processes, and how to start and kill each."""
+    """All processes; starts and kills each."""
 
     def __init__(self, folder: Path, world: str, mode: str, seed: int) -> None:
         self._folder, self._world, self._mode = folder, world, mode
@@ -91,7 +91,7 @@ class System:
         self.parts: dict[str, Part] = {}
 
     def start_node(self) -> None:
-        """Start the node with its page, as `docs/live.md` says."""
+        """Start the node with its page, as in `docs/live.md`."""
         arguments = [f"_mode:={self._mode}", f"_saved_pose_file:={self.saved_pose}"]
         command = ["-m", "firstfix", "serve", self._map, "--robot", "ros1", "--port", self._port]
         self._start("node", *command, "--", *arguments)
@@ -102,16 +102,16 @@ class System:
         self._start("robot", *command, *(["--start", *start] if start else []))
 
     def start_observer(self) -> None:
-        """Start who listens to the node."""
+        """Start the observer of the node."""
         self._start("observer", HERE / "soak_observer.py", "ros", self.said)
 
     def start_viewer(self) -> None:
-        """Start who looks at the page."""
+        """Start the viewer of the page."""
         url = f"ws://127.0.0.1:{self._port}/v1/live"
         self._start("viewer", HERE / "soak_observer.py", "page", self.seen, url)
 
     def tell(self, **order: Any) -> None:
-        """Tell the robot what happens to it; a dead one does not hear it."""
+        """Send a command to the robot, if it runs."""
         if "robot" in self.parts:
             with contextlib.suppress(OSError):
                 self.parts["robot"].tell(**order)
@@ -132,13 +132,13 @@ class System:
         return last
 
     def end(self) -> None:
-        """End all, the node first and kindly."""
+        """End all, the node first and by SIGINT."""
         for name in list(self.parts):
             self.parts.pop(name).end()
         self.core.end()
 
     def logs(self) -> Iterator[tuple[str, str]]:
-        """Return what each process said."""
+        """Return the log of each process."""
         for path in sorted(self._folder.glob("log-*")):
             name = path.stem.split("-")[1]
             yield name, path.read_text(encoding="utf-8", errors="replace")

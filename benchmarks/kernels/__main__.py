@@ -1,11 +1,10 @@
-"""Time every kernel against what this machine can do at most, measured in the same run.
+"""Time every kernel against the limit of this machine, measured in the same run.
 
-Prints a table of Markdown. A kernel's time is processor time for a unit of its work. Its limit is
-what the same machine takes for the least that the unit needs: the bytes it must move, at the speed
-of the cache that its working set lives in, or its arithmetic in vectors, or its look-ups in no
-order, whichever is slower; all measured by tiny kernels of the benchmark, in turns with the kernels
-of firstfix. The share is limit over time, of the fastest runs: other programs make both slower, and
-nothing makes them faster.
+Prints a Markdown table. The time of a kernel is processor time per unit of its work. Its limit is
+the least time that this machine needs for the unit: for the bytes at the speed of the cache that
+the working set fits into, for the arithmetic in vectors, or for the look-ups in random order,
+whichever is slowest. Reference loops measure these, alternately with the kernels of firstfix. The
+share is limit over time, both of the fastest runs, because other load only makes runs slower.
 
     python benchmarks/kernels [MAP_FOLDER] [--offices 3] [--runs 15] [--json FILE]
 """
@@ -41,7 +40,7 @@ from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import random_free_pose
 from firstfix.lab.worlds.many_offices import many_offices
 
-# A sample takes at least as long, or the clock and the call would be seen.
+# Least duration of a sample: the clock and the call are negligible then.
 SAMPLE_NS = 3e6
 
 
@@ -58,7 +57,7 @@ def main() -> None:
     if not arguments.only:
         report_missing(measured)
     used = dict.fromkeys(limit for k in measured for roof in k.roofs.values() for limit, _ in roof)
-    used[limits.surprises()] = None  # binds none by itself, and slows some
+    used[limits.surprises()] = None  # not a limit by itself, but slows some kernels
     times = interleaved([*used, *measured], arguments.runs)
     of_limits = [limit_row(limit, times[limit]) for limit in used]
     of_kernels = [kernel_row(k, times) for k in measured]
@@ -82,7 +81,7 @@ def map_of(folder: Path | None, offices: int) -> OccupancyGrid:
 
 
 def kernels(grid: OccupancyGrid) -> list[Kernel]:
-    """Put every kernel of firstfix to work on one map and one scan."""
+    """Prepare every kernel of firstfix with one map and one scan."""
     rng = np.random.default_rng(0)
     pose = random_free_pose(grid, rng)
     scan = Lidar().scan(grid, pose, rng)
@@ -96,7 +95,7 @@ def kernels(grid: OccupancyGrid) -> list[Kernel]:
 
 
 def report_missing(measured: Iterable[Kernel]) -> None:
-    """Fail if firstfix has a kernel that no line of the table stands for."""
+    """Fail if firstfix has a kernel that is not in the table."""
     covered = {name_of(function) for k in measured for function in (k.function, *k.parts)}
     missing = sorted(name_of(function) for function in compiled_functions() - {None})
     missing = [name for name in missing if name not in covered]
@@ -118,7 +117,7 @@ def compiled_functions() -> set[Any]:
 
 
 def interleaved(things: list[Limit | Kernel], runs: int) -> dict[Limit | Kernel, list[float]]:
-    """Take turns: ns of processor time for a unit of each thing, so many runs."""
+    """Run all alternately; return ns of processor time per unit, one for each run."""
     times: dict[Limit | Kernel, list[float]] = {thing: [] for thing in things}
     repeats = {thing: max(1, round(SAMPLE_NS / one_call(thing.call))) for thing in things}
     for _ in range(runs):

@@ -1,4 +1,4 @@
-"""What this machine can do at most: our own tiny kernels, timed beside the kernels they judge.
+"""Limits of this machine: reference loops, timed alternately with the kernels.
 
 A limit is an amount of work a nanosecond. Limits of memory belong to a working set: they are
 measured on so many bytes, so that they hold for the cache which these bytes live in.
@@ -45,7 +45,7 @@ class Limit:
 
 @cache
 def cache_sizes() -> dict[str, int]:
-    """Bytes of this processor's data caches, by level, as the kernel of Linux tells them."""
+    """Bytes of this processor's data caches, by level, as reported by Linux."""
     sizes: dict[str, int] = {}
     for entry in sorted(Path("/sys/devices/system/cpu/cpu0/cache").glob("index*")):
         if (entry / "type").read_text().strip() != "Instruction":
@@ -185,7 +185,7 @@ def calls(what: str) -> Limit:
 
 @cache
 def surprises() -> Limit:
-    """Branches that nobody could foretell; each costs what the processor threw away."""
+    """Branches that cannot be predicted; each costs the discarded work of the processor."""
     bits = np.random.default_rng(0).random(65536) < 0.5
     kept = np.empty(bits.size, np.int64)
     return Limit("branches foretold wrong", bits.size / 2, lambda: _keep(bits, kept))
