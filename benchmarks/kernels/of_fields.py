@@ -17,8 +17,8 @@ from firstfix.fields import (
     endpoint_field,
     range_table,
     raycast,
-    search_grid,
 )
+from firstfix.fields.distance import truncated_squares
 from firstfix.fields.map_fields import MapFields
 
 FIRST_POSES = 2000
@@ -29,7 +29,6 @@ def kernels(fields: MapFields, rng: np.random.Generator) -> list[Kernel]:
     return [
         *_distances(fields.grid, fields.near),
         _clearance(fields.grid),
-        _blocks(fields),
         _pooled(fields),
         _walked(fields.grid, rng),
         _table(fields, rng),
@@ -38,7 +37,7 @@ def kernels(fields: MapFields, rng: np.random.Generator) -> list[Kernel]:
 
 def _distances(grid: OccupancyGrid, near: int) -> list[Kernel]:
     occupied, cells = np.ascontiguousarray(grid.occupied), float(grid.occupied.size)
-    manhattan, squares = np.empty((2, *occupied.shape), np.uint16)
+    manhattan = np.empty(occupied.shape, np.uint16)
     euclidean = np.empty(occupied.shape, np.float32)
     column = euclidean.view(np.int32)
     rounds = _rounds(occupied, near)
@@ -74,10 +73,10 @@ def _distances(grid: OccupancyGrid, near: int) -> list[Kernel]:
         ),
         Kernel(
             function=distance_kernels.truncated,
-            parts=(distance_kernels._look_outward,),
+            parts=(),
             unit="cell",
             units=cells,
-            call=lambda: distance_kernels.truncated(occupied, near, squares),
+            call=lambda: truncated_squares(occupied, near),
             working_set=3 * cells,
             moved=7,
             operations=8 + 3.25 * rounds,
@@ -105,13 +104,12 @@ def _rounds(occupied: NDArray[np.bool_], limit: int) -> float:
 
 def _clearance(grid: OccupancyGrid) -> Kernel:
     occupied, cells = np.ascontiguousarray(grid.occupied), float(grid.occupied.size)
-    out = np.empty(occupied.shape, np.uint8)
     return Kernel(
         function=clearance._sweep,
-        parts=(clearance._nearest_of_three, clearance._look_along, clearance._step_along),
+        parts=(clearance._nearest_of_three, clearance._step_along),
         unit="cell",
         units=cells,
-        call=lambda: clearance._sweep(occupied, out),
+        call=lambda: clearance.chessboard_clearance(occupied),
         working_set=2 * cells,
         moved=4,
         operations=46,
@@ -124,37 +122,19 @@ def _clearance(grid: OccupancyGrid) -> Kernel:
     )
 
 
-def _blocks(fields: MapFields) -> Kernel:
-    grid, stride = fields.grid, fields.positions.stride
-    free, occupied, cells = grid.seen_free, grid.occupied, float(grid.occupied.size)
-    return Kernel(
-        function=search_grid._free_blocks,
-        parts=(),
-        unit="cell",
-        units=cells,
-        call=lambda: search_grid._free_blocks(free, occupied, stride),
-        working_set=2 * cells,
-        moved=1 + 1 / stride**2,
-        operations=1,
-        roofs={
-            "memory": ((limits.read(2 * cells), 1 + 1 / stride**2),),
-            # Counts of a column are read and written for each of its cells, then read once.
-            "nearest cache": ((limits.copy(4 * grid.width), 8 + 12 / stride),),
-        },
-    )
-
-
 def _pooled(fields: MapFields) -> Kernel:
     squares, side = fields.squares, max(1, fields.positions.stride // 2)
     metres = np.sqrt(np.arange(int(squares.max()) + 1)) * fields.grid.resolution
     table = np.minimum(metres / endpoint_field.UNIT_M, endpoint_field.LIMIT).astype(np.float32)
     cells = float(squares.size)
+    pooled = np.empty([-(-n // side) for n in squares.shape], np.uint8)
+    rows = np.empty(squares.shape[1]), np.empty(pooled.shape[1])
     return Kernel(
         function=endpoint_field._pool,
         parts=(),
         unit="cell",
         units=cells,
-        call=lambda: endpoint_field._pool(squares, table, side),
+        call=lambda: endpoint_field._pool(squares, table, side, *rows, pooled),
         working_set=2 * cells,
         moved=2 + 1 / side**2,
         operations=1 + 3 / side**2,
@@ -219,7 +199,7 @@ def _table(fields: MapFields, rng: np.random.Generator) -> Kernel:
     mean_cells = float(table.mean()) / per_cell
     return Kernel(
         function=range_table._fill,
-        parts=(raycast.cast_ray_leaping, raycast._is_inside_cell),
+        parts=(raycast.cast_ray_leaping,),
         unit="leap",
         units=leaps,
         call=lambda: range_table._fill(fields.clearance, x, y, dx, dy, per_cell, table),

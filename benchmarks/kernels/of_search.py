@@ -83,7 +83,7 @@ def _searched(fields: MapFields, queries: Any) -> list[Kernel]:
         ),
         Kernel(
             function=search._add_ranges,
-            parts=(search._mismatch,),
+            parts=(),
             unit="beam at a pose",
             units=float(table.shape[0] * DIRECTIONS * n_ranges),
             call=lambda: _all_positions(table, *of_scan, narrow, wide),
@@ -190,6 +190,7 @@ def _descend_field(found: NDArray[np.float64], beams: Beams, fields: MapFields) 
             fields.distances,
             sigmas / resolution,
             refine._STIFFNESS_BEAMS_M2 / resolution**2,
+            (np.empty((3, 3)), np.empty((3, 3)), np.empty(3)),
         ),
         working_set=working_set,
         moved=2 * 8 + 4 * (2 + 4),
@@ -221,6 +222,7 @@ def _descend_rays(best: NDArray[np.float64], beams: Beams, fields: MapFields) ->
             fields.squares,
             fields.distances,
             resolution,
+            (np.empty(4), np.empty((4, 4)), np.empty(4)),
         )
 
     with mock.patch.object(refine, "_solve", wraps=refine._solve) as solved:
@@ -230,7 +232,7 @@ def _descend_rays(best: NDArray[np.float64], beams: Beams, fields: MapFields) ->
     mean_cells = float(ranges.mean())
     return Kernel(
         function=refine._descend_rays,
-        parts=(refine._normal,),
+        parts=(),
         unit="beam of a round",
         units=float(rounds * len(hits)),
         call=call,
@@ -279,7 +281,7 @@ def _verify(refined: NDArray[np.float64], beams: Beams, fields: MapFields) -> Ke
 def _suppress(fields: MapFields, hits: Beams) -> Kernel:
     tried, scores = exhaustive.ExhaustiveSearch(fields, exhaustive.FAST).pose_scores(hits)
     order = np.argsort(scores, kind="stable")
-    near = places.SEPARATION_M / fields.grid.resolution, places.SEPARATION_RAD
+    near = places.SAME_PLACE_M / fields.grid.resolution, places.SAME_PLACE_RAD
     most = SHORTLIST  # of the ten that the paper publishes, only the call would be seen
     seen, compared = counts.pairs(tried, order, *near, most)
     return Kernel(
@@ -287,7 +289,7 @@ def _suppress(fields: MapFields, hits: Beams) -> Kernel:
         parts=(),
         unit="pair of poses",
         units=float(compared),
-        call=lambda: places._suppress(tried, order, *near, most),
+        call=lambda: places._suppress(tried, order, *near, np.empty(most, np.int64)),
         working_set=float(tried.nbytes),
         moved=32 * seen / compared,
         operations=11,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.fields.kernel_cache import kernel
+from firstfix.fields.kernel_cache import kernel, part
 
 MAX_CLEARANCE = 255
 """Largest clearance reported, cells."""
@@ -32,21 +32,30 @@ def chessboard_clearance(occupied: NDArray[np.bool_]) -> NDArray[np.uint8]:
         Distance, cells, at most `MAX_CLEARANCE`; 0 in a wall.
     """
     clearance = np.empty(occupied.shape, np.uint8)
-    _sweep(np.ascontiguousarray(occupied), clearance)
+    width = occupied.shape[1]
+    # Beyond the ends of a row the kernels read the largest clearance.
+    before = np.full(width + 2, MAX_CLEARANCE, np.uint8)
+    padded = np.full((2, width + 2 * _MARGIN), MAX_CLEARANCE, np.uint8)
+    nearest = np.empty(width, np.uint8)
+    _sweep(np.ascontiguousarray(occupied), before, nearest, padded[0], padded[1], clearance)
     return clearance
 
 
 @kernel
-def _sweep(occupied: NDArray[np.bool_], clearance: NDArray[np.uint8]) -> None:
+def _sweep(
+    occupied: NDArray[np.bool_],
+    before: NDArray[np.uint8],
+    nearest: NDArray[np.uint8],
+    one: NDArray[np.uint8],
+    other: NDArray[np.uint8],
+    clearance: NDArray[np.uint8],
+) -> None:
     """Go down and up in straight and diagonal steps, then along each row.
 
     A shortest chessboard path is some diagonal steps and then straight ones. So each cell needs its
     neighbours in the row only once, at the end, and all loops compile to vector instructions.
     """
     height, width = occupied.shape
-    # One cell of the largest clearance on both sides stands for the world outside.
-    before = np.full(width + 2, np.uint8(MAX_CLEARANCE))
-    nearest = np.empty(width, np.uint8)
     for r in range(height):
         wall, row = occupied[r], clearance[r]
         _nearest_of_three(before, nearest)
@@ -54,10 +63,8 @@ def _sweep(occupied: NDArray[np.bool_], clearance: NDArray[np.uint8]) -> None:
             row[c] = nearest[c] & np.uint8(np.uint8(wall[c]) - np.uint8(1))  # 0 in a wall
         for c in range(width):  # a slice would compile NumPy's broadcasting, which takes seconds
             before[c + 1] = row[c]
-    before[:] = MAX_CLEARANCE
-    # Steps beyond the ends of a row read the largest clearance.
-    padded = np.full((2, width + 2 * _MARGIN), np.uint8(MAX_CLEARANCE))
-    one, other = padded[0], padded[1]
+    for c in range(width):
+        before[c + 1] = MAX_CLEARANCE
     for r in range(height - 1, -1, -1):
         row = clearance[r]
         _nearest_of_three(before, nearest)
@@ -78,7 +85,7 @@ def _nearest_of_three(before: NDArray[np.uint8], nearest: NDArray[np.uint8]) -> 
         nearest[c] = np.uint8(min(left[c], most, middle[c], right[c]) + one)
 
 
-@kernel
+@part
 def _look_along(
     row: NDArray[np.uint8], padded: NDArray[np.uint8], other: NDArray[np.uint8]
 ) -> None:

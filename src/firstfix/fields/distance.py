@@ -77,5 +77,7 @@ def truncated_squares(occupied: NDArray[np.bool_], limit: int) -> NDArray[np.uin
     if not 1 <= limit <= MAX_LIMIT:
         raise ValueError(f"limit must be 1 to {MAX_LIMIT} cells, not {limit}")
     squares = np.empty(occupied.shape, np.uint16)
-    distance_kernels.truncated(np.ascontiguousarray(occupied), limit, squares)
+    near = np.full(occupied.shape[1], limit, np.uint16)
+    padded = np.full(occupied.shape[1] + 2 * limit, limit**2, np.uint16)
+    distance_kernels.truncated(np.ascontiguousarray(occupied), limit, near, padded, squares)
     return squares

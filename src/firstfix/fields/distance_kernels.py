@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.fields.kernel_cache import kernel
+from firstfix.fields.kernel_cache import kernel, part
 
 SATURATED = 65535
 
@@ -122,11 +122,20 @@ def _squares_of_envelope(
 
 
 @kernel
-def truncated(occupied: NDArray[np.bool_], limit: int, squares: NDArray[np.uint16]) -> None:
-    """Write the squared distance, at most ``limit`` squared."""
+def truncated(
+    occupied: NDArray[np.bool_],
+    limit: int,
+    near: NDArray[np.uint16],
+    padded: NDArray[np.uint16],
+    squares: NDArray[np.uint16],
+) -> None:
+    """Write the squared distance, at most ``limit`` squared.
+
+    ``near`` is a row of the limit. ``padded`` is a row of its square with a margin of the limit on
+    both sides, so that the inner loop needs no checks at the edges.
+    """
     height, width = occupied.shape
     top, one = np.uint16(limit), np.uint16(1)
-    near = np.full(width, top)
     for r in range(height):
         wall, row = occupied[r], squares[r]
         for c in range(width):
@@ -134,9 +143,8 @@ def truncated(occupied: NDArray[np.bool_], limit: int, squares: NDArray[np.uint1
             near[c] = np.uint16(0) if wall[c] else step
         for c in range(width):
             row[c] = near[c]
-    near[:] = top
-    # With a margin of the limit on both sides the inner loop needs no checks at the edges.
-    padded = np.full(width + 2 * limit, np.uint16(limit * limit))
+    for c in range(width):
+        near[c] = top
     for r in range(height - 1, -1, -1):
         row, inner = squares[r], padded[limit : limit + width]
         for c in range(width):
@@ -148,7 +156,7 @@ def truncated(occupied: NDArray[np.bool_], limit: int, squares: NDArray[np.uint1
             _look_outward(padded[begin : begin + best.size + 2 * limit], limit, best)
 
 
-@kernel
+@part
 def _look_outward(window: NDArray[np.uint16], limit: int, best: NDArray[np.uint16]) -> None:
     """Compare with columns ever farther away until none can be nearer; window = best + margins."""
     n = best.size

@@ -48,23 +48,34 @@ def build_endpoint_field(
     side = max(1, stride // 2)
     phases = stride // side
     margin = math.ceil(reach_m / resolution / stride) + 1
-    pooled = np.pad(_pool(squares, table, side), margin * phases, constant_values=LIMIT)
+    height, width = squares.shape
+    pooled = np.empty((-(-height // side), -(-width // side)), np.uint8)
+    _pool(squares, table, side, np.empty(width), np.empty(pooled.shape[1]), pooled)
+    pooled = np.pad(pooled, margin * phases, constant_values=LIMIT)
     return lay_out(pooled, side, phases, margin)
 
 
 @kernel
-def _pool(squares: NDArray[np.uint16], table: NDArray[np.float32], side: int) -> NDArray[np.uint8]:
+def _pool(
+    squares: NDArray[np.uint16],
+    table: NDArray[np.float32],
+    side: int,
+    totals: NDArray[np.float64],
+    sums: NDArray[np.float64],
+    pooled: NDArray[np.uint8],
+) -> None:
+    """Write the mean distance of every block; totals and sums are rows to work in."""
     height, width = squares.shape
-    pooled = np.empty((-(-height // side), -(-width // side)), np.uint8)
-    totals, sums = np.empty(width, np.float64), np.empty(pooled.shape[1], np.float64)
     for row in range(pooled.shape[0]):
-        totals[:] = 0.0
+        for x in range(width):
+            totals[x] = 0.0
         first, end = row * side, min(height, (row + 1) * side)
         for y in range(first, end):
             line = squares[y]
             for x in range(width):
                 totals[x] += table[line[x]]
-        sums[:] = 0.0
+        for column in range(pooled.shape[1]):
+            sums[column] = 0.0
         for step in range(side):
             for column in range((width - step + side - 1) // side):
                 sums[column] += totals[column * side + step]
@@ -74,4 +85,3 @@ def _pool(squares: NDArray[np.uint16], table: NDArray[np.float32], side: int) ->
         if width % side > 0:
             cells = np.float64((end - first) * (width % side))
             out[width // side] = np.uint8(np.int32(sums[width // side] / cells + 0.5))
-    return pooled

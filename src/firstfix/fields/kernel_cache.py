@@ -29,7 +29,10 @@ Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 PACKAGE = Path(__file__).parents[1]
 _FOLDERS = ("amcl", "belief", "fields", "global_localization", "lab/simulation")
-_CONSTANTS = ("core/angles.py",)
+_CONSTANTS = ("core/angles.py", "fields/search_grid.py")
+
+# Less to compile: no check for a division by zero, no entry point for C.
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
 
 _PREFIX = "kernels-"
 # Other versions may share the folder: keep what was used lately.
@@ -44,8 +47,14 @@ def kernel(function: Kernel) -> Kernel:
     user's cache folder. Numba's settings for other packages stay as they are.
     """
     with _cached_in(kernel_folder()):
-        compiled: Any = njit(cache=True, nogil=True)(function)
+        compiled: Any = njit(cache=True, nogil=True, **_OPTIONS)(function)
     return cast("Kernel", compiled)
+
+
+def part(function: Kernel) -> Kernel:
+    """Copy a function into the kernels that call it: it is never compiled by itself."""
+    copied: Any = njit(nogil=True, inline="always", **_OPTIONS)(function)
+    return cast("Kernel", copied)
 
 
 def kernel_sources() -> list[Path]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.fields.kernel_cache import kernel
+from firstfix.fields.kernel_cache import kernel, part
 
 # Stands for 1/0 in the direction a ray does not move: times 0 it is 0 where infinity were NaN,
 # times the side of any map it is still finite.
@@ -180,7 +180,7 @@ def cast_ray_leaping(
     return max_range_cells
 
 
-@kernel
+@part
 def _is_inside_cell(along: float) -> bool:
     """Return whether a coordinate lies so far inside a cell that rounding cannot move it out."""
     return abs(along - math.floor(along + 0.5)) > _NEAR_LINE

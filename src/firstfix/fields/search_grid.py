@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.grid import OccupancyGrid
-from firstfix.fields.kernel_cache import kernel
 
 TILE_ROWS = 16
 TILE_COLUMNS = 64
@@ -106,29 +105,19 @@ def build_search_grid(grid: OccupancyGrid) -> SearchGrid:
     )
 
 
-@kernel
 def _free_blocks(
     free: NDArray[np.bool_], occupied: NDArray[np.bool_], stride: int
 ) -> NDArray[np.bool_]:
     height, width = free.shape
-    blocks = np.zeros((-(-height // stride), -(-width // stride)), np.bool_)
-    counts, sums = np.empty(width, np.int32), np.empty(blocks.shape[1], np.int32)
-    for row in range(blocks.shape[0]):
-        y = row * stride + stride // 2
-        if y >= height:
-            continue
-        centres, walls, block = free[y], occupied[y], blocks[row]
-        counts[:] = 0
-        for y in range(row * stride, min(height, (row + 1) * stride)):
-            line = free[y]
-            for x in range(width):
-                counts[x] += np.int32(line[x])
-        sums[:] = 0
-        for step in range(stride):
-            for column in range((width - step + stride - 1) // stride):
-                sums[column] += counts[column * stride + step]
-        for column in range((width - stride // 2 + stride - 1) // stride):
-            x = column * stride + stride // 2
-            if not walls[x]:
-                block[column] = centres[x] or 2 * sums[column] >= stride * stride
+    starts = (np.arange(0, n, stride) for n in (height, width))
+    counts = free.view(np.uint8)
+    for axis, start in enumerate(starts):
+        counts = np.add.reduceat(counts, start, axis=axis, dtype=np.int32)
+    # A block on the upper or right edge may have no central cell.
+    middle = slice(stride // 2, None, stride)
+    centres, walls = free[middle, middle], occupied[middle, middle]
+    rows, columns = centres.shape
+    blocks = np.zeros(counts.shape, np.bool_)
+    half_free = 2 * counts[:rows, :columns] >= stride * stride
+    blocks[:rows, :columns] = ~walls & (centres | half_free)
     return blocks

@@ -49,7 +49,9 @@ def distinct_places(
         Indices of the chosen poses.
     """
     order = np.argsort(scores, kind="stable")
-    return _suppress(poses, order, SAME_PLACE_M / resolution, SAME_PLACE_RAD, most)
+    kept = np.empty(min(most, len(order)), np.int64)
+    n = _suppress(poses, order, SAME_PLACE_M / resolution, SAME_PLACE_RAD, kept)
+    return kept[:n]
 
 
 @kernel
@@ -58,15 +60,17 @@ def _suppress(
     order: NDArray[np.int64],
     near_cells: float,
     near_rad: float,
-    most: int,
-) -> NDArray[np.int64]:
-    kept = np.empty(min(most, order.shape[0]), np.int64)
+    kept: NDArray[np.int64],
+) -> int:
+    """Write the indices of the poses kept, and return how many these are."""
     n = 0
-    for i in order:
+    for o in range(order.shape[0]):
         if n == kept.shape[0]:
             break
+        i = order[o]
         taken = False
-        for j in kept[:n]:
+        for k in range(n):
+            j = kept[k]
             turn = abs(poses[i, 2] - poses[j, 2])
             if turn >= FULL_TURN:  # rare, and a remainder takes as long as the rest of the loop
                 turn %= FULL_TURN
@@ -78,4 +82,4 @@ def _suppress(
         if not taken:
             kept[n] = i
             n += 1
-    return kept[:n]
+    return n

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.fields.kernel_cache import kernel
+from firstfix.fields.kernel_cache import kernel, part
 from firstfix.fields.map_fields import MapFields
 from firstfix.fields.raycast import cast_ray_leaping
 from firstfix.global_localization.beams import Beams
@@ -109,6 +109,7 @@ def refine_on_field(
         fields.distances,
         sigmas / resolution,
         _STIFFNESS_BEAMS_M2 / resolution**2,
+        (np.empty((3, 3)), np.empty((3, 3)), np.empty(3)),
     )
     return refined
 
@@ -153,6 +154,7 @@ def refine_on_rays(
         fields.squares,
         fields.distances,
         resolution,
+        (np.empty(4), np.empty((4, 4)), np.empty(4)),
     )
     # Marginalise the depth of the walls: invert first, then drop its row and column.
     covariances = np.linalg.inv(information)[:, :3, :3] * variances[:, None, None]
@@ -160,7 +162,7 @@ def refine_on_rays(
 
 
 @kernel
-def _descend_field(
+def _descend_field(  # noqa: PLR0913 - a kernel takes its arrays one by one
     poses: NDArray[np.float64],
     ends_x: NDArray[np.float64],
     ends_y: NDArray[np.float64],
@@ -168,16 +170,16 @@ def _descend_field(
     distances: NDArray[np.float32],
     sigmas: NDArray[np.float64],
     heading_stiffness: float,
+    scratch: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
 ) -> None:
     height, width = squares.shape
-    A, L = np.empty((3, 3)), np.empty((3, 3))
-    g = np.empty(3)
+    A, L, g = scratch
     for k in range(poses.shape[0]):
-        for sigma in sigmas:
-            A[:] = 0.0
+        for s in range(sigmas.shape[0]):
+            sigma = sigmas[s]
+            _clear(A, g)
             A[0, 0] = A[1, 1] = _STIFFNESS_BEAMS
             A[2, 2] = heading_stiffness
-            g[:] = 0.0
             cos, sin = math.cos(poses[k, 2]), math.sin(poses[k, 2])
             for i in range(ends_x.shape[0]):
                 px, py = cos * ends_x[i] - sin * ends_y[i], sin * ends_x[i] + cos * ends_y[i]
@@ -245,20 +247,18 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
     squares: NDArray[np.uint16],
     distances: NDArray[np.float32],
     resolution: float,
+    scratch: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
 ) -> None:
     sigma, gate = _RAY_SIGMA_M / resolution, _RAY_GATE_M / resolution
     step, settled = _RAY_STEP_M / resolution, _SETTLED_M / resolution
-    J = np.empty(4)
-    L = np.empty((4, 4))
-    g = np.empty(4)
+    J, L, g = scratch
     for k in range(poses.shape[0]):
         A = information[k]
         depth = _WALL_DEPTH_CELLS
         for _ in range(_RAY_ROUNDS):
-            A[:] = 0.0
+            _clear(A, g)
             A[0, 0] = A[1, 1] = _RAY_STIFFNESS_BEAMS
             A[2, 2] = _RAY_STIFFNESS_BEAMS_M2 / resolution**2
-            g[:] = 0.0
             weights, squared = 0.0, 0.0
             A[3, 3] = 1.0 / _WALL_DEPTH_SIGMA_CELLS**2
             g[3] = (depth - _WALL_DEPTH_CELLS) / _WALL_DEPTH_SIGMA_CELLS**2
@@ -303,12 +303,20 @@ def _descend_rays(  # noqa: PLR0913 - a kernel takes its arrays one by one
         variances[k] = max(squared / max(weights, 1.0), _LEAST_VARIANCE_CELLS2)
 
 
-@kernel
+@part
+def _clear(A: NDArray[np.float64], g: NDArray[np.float64]) -> None:
+    for i in range(g.shape[0]):
+        g[i] = 0.0
+        for j in range(g.shape[0]):
+            A[i, j] = 0.0
+
+
+@part
 def _clipped(value: float, most: float) -> float:
     return max(-most, min(most, value))
 
 
-@kernel
+@part
 def _normal(
     squares: NDArray[np.uint16], distances: NDArray[np.float32], x: float, y: float
 ) -> tuple[float, float]:

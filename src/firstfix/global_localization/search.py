@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from firstfix.core.angles import FULL_TURN
 from firstfix.core.estimate import SearchReport
 from firstfix.fields import endpoint_field, range_table
-from firstfix.fields.kernel_cache import kernel
+from firstfix.fields.kernel_cache import kernel, part
 from firstfix.fields.map_fields import MapFields
 from firstfix.fields.range_table import DIRECTIONS
 from firstfix.fields.search_grid import TILE_COLUMNS, TILE_ROWS
@@ -179,6 +179,13 @@ def _score_tiles(
         (endpoints.values, endpoints.columns, queries.offsets),
         (fields.ranges, queries.directions, queries.counts, queries.through, queries.short),
         (queries.endpoint_weight, queries.range_weight),
+        (
+            np.empty((TILE_ROWS, DIRECTIONS, TILE_COLUMNS), np.uint16),
+            np.zeros((DIRECTIONS, TILE_COLUMNS), np.uint16),
+            np.empty(DIRECTIONS, np.uint8),
+            np.empty(DIRECTIONS, np.uint16),
+            np.empty((SECTORS, TILE_COLUMNS), np.int32),
+        ),
         best,
     )
 
@@ -226,16 +233,20 @@ def _score(  # noqa: PLR0913 - a kernel takes its arrays one by one
         NDArray[np.uint8],
     ],
     weights: tuple[np.int32, np.int32],
+    scratch: tuple[
+        NDArray[np.uint16],
+        NDArray[np.uint16],
+        NDArray[np.uint8],
+        NDArray[np.uint16],
+        NDArray[np.int32],
+    ],
     best: NDArray[np.int32],
 ) -> None:
     counts, pitch, offsets = endpoints
     table, directions, measured, through, short = ranges
-    ends = np.empty((TILE_ROWS, DIRECTIONS, TILE_COLUMNS), np.uint16)
-    gaps = np.zeros((DIRECTIONS, TILE_COLUMNS), np.uint16)
-    narrow = np.empty(DIRECTIONS, np.uint8)
-    wide = np.empty(DIRECTIONS, np.uint16)
-    words = np.empty((SECTORS, TILE_COLUMNS), np.int32)
-    for tile in tiles:
+    ends, gaps, narrow, wide, words = scratch
+    for t in range(tiles.shape[0]):
+        tile = tiles[t]
         _add_endpoints(counts, tile_bases[tile], pitch, offsets, ends)
         k = tile_starts[tile]
         while k < tile_starts[tile + 1]:
@@ -262,7 +273,8 @@ def _choose_headings(
     """Best score of a row of positions in every sector, its heading in the lowest bits."""
     for sector in range(SECTORS):
         word = words[sector]
-        word[:] = _UNSEEN
+        for c in range(TILE_COLUMNS):
+            word[c] = _UNSEEN
         for i in range(DIRECTIONS // SECTORS):
             h = sector * (DIRECTIONS // SECTORS) + i
             end, gap = ends[h], gaps[h]
@@ -285,8 +297,11 @@ def _add_endpoints(
     n = offsets.shape[1]
     # Unsigned indices cannot count from the end of an array, so that LLVM can vectorise the loop.
     pitch = np.uint64(columns)
-    ends[:] = 0
     for h in range(DIRECTIONS):
+        for r in range(TILE_ROWS):
+            row = ends[r, h]
+            for x in range(TILE_COLUMNS):
+                row[x] = 0
         i = 0
         while i + 12 <= n:
             a = counts[base + offsets[h, i] :]
@@ -320,7 +335,7 @@ def _add_endpoints(
             i += 1
 
 
-@kernel
+@part
 def _mismatch(
     measured: np.uint8, expected: np.uint8, through: np.uint8, short: np.uint8
 ) -> np.uint8:
@@ -339,10 +354,12 @@ def _add_ranges(
     wide: NDArray[np.uint16],
 ) -> None:
     n = directions.shape[0]
-    wide[:] = 0
+    for h in range(DIRECTIONS):
+        wide[h] = 0
     j = 0
     while j < n:
-        narrow[:] = 0
+        for h in range(DIRECTIONS):
+            narrow[h] = 0
         end = min(n, j + 24)
         while j < end:
             a, b = expected[directions[j] :], expected[directions[j + 1] :]
