@@ -50,10 +50,12 @@ PUBLIC = [
     "load_map",
     "load_recording",
     "load_trajectory",
+    "points_from_depth",
     "precompile",
     "save_map",
     "save_recording",
     "save_trajectory",
+    "scan_from_points",
     "simulate_drive",
 ]
 

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from firstfix.core.estimate import Evidence, Hypothesis, LocateResult, SearchReport, Verdict
     from firstfix.core.grid import OccupancyGrid
     from firstfix.core.odometry import Odometry, Signal, SignalKind
+    from firstfix.core.points import points_from_depth, scan_from_points
     from firstfix.core.recording import Recording
     from firstfix.core.scan import LaserScan, Mounting
     from firstfix.core.se2 import SE2
@@ -81,10 +82,12 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "load_map",
     "load_recording",
     "load_trajectory",
+    "points_from_depth",
     "precompile",
     "save_map",
     "save_recording",
     "save_trajectory",
+    "scan_from_points",
     "simulate_drive",
 ]
 
@@ -95,6 +98,7 @@ _MODULES = {
     "core.estimate": ("Evidence", "Hypothesis", "LocateResult", "SearchReport", "Verdict"),
     "core.grid": ("OccupancyGrid",),
     "core.odometry": ("Odometry", "Signal", "SignalKind"),
+    "core.points": ("points_from_depth", "scan_from_points"),
     "core.recording": ("Recording",),
     "core.scan": ("LaserScan", "Mounting"),
     "core.se2": ("SE2",),

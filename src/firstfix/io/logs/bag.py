@@ -13,6 +13,7 @@ from firstfix.core.recording import Recording
 from firstfix.core.scan import LaserScan
 from firstfix.core.trajectory import Trajectory
 from firstfix.io.logs.bag_file import ODOMETRY, SCAN, TRANSFORMS, BagFile
+from firstfix.io.logs.bag_points import KINDS, converter
 from firstfix.io.logs.checks import (
     SORTED_AHEAD,
     ascending,
@@ -58,6 +59,9 @@ def load_bag(
 ) -> Recording:
     """Read the scans of one topic, and the odometry, from a bag.
 
+    Point clouds and depth images, whose topic has to be named, become scans by
+    `firstfix.core.points.scan_from_points` with its default band of heights.
+
     The base is ``base_link``, else ``base_footprint``, else the frame that odometry moves,
     the first of them to which constant transforms (on ``/tf_static`` or, as in ROS 1, repeated on
     ``/tf``) connect the sensor. If there is none, the base is the sensor, odometry is omitted, and
@@ -88,7 +92,9 @@ def load_bag(
     path = Path(path)
     n_most = check_max_scans(max_scans)
     with located(f"{path}"), BagFile(path) as bag:
-        topic = _scan_topic(bag, topic)
+        topic, kind = _scan_topic(bag, topic)
+        if kind in KINDS:
+            return _load_points(bag, topic, kind, n_most, given)
         messages = islice(bag.messages(SCAN, [topic]), n_most + SORTED_AHEAD)
         read = [_Sweep(*item) for item in messages]
         check_count(len(read), max_scans, path)
@@ -106,19 +112,21 @@ def load_bag(
         return _recording(topic, sweeps, places, odometry, [*notes, *sorting_notes(order)])
 
 
-def _scan_topic(bag: BagFile, topic: str | None) -> str:
-    found = bag.topics_of(SCAN)
+def _scan_topic(bag: BagFile, topic: str | None) -> tuple[str, str]:
+    """Return the topic and its type. Point clouds and depth images have to be named."""
+    found = [(name, kind) for name, kind in bag.topics() if kind == SCAN]
     if topic is not None:
-        found = [name for name in found if name.strip("/") == topic.strip("/")]
+        usable = [(name, kind) for name, kind in bag.topics() if kind in (SCAN, *KINDS)]
+        found = [(name, kind) for name, kind in usable if name.strip("/") == topic.strip("/")]
     elif len(found) > 1:
-        found = [name for name in found if name.strip("/") == "scan"]
+        found = [(name, kind) for name, kind in found if name.strip("/") == "scan"]
     if len(found) == 1:
         return found[0]
     listed = ", ".join(f"{name} ({kind})" for name, kind in bag.topics())
     raise ScanError(
         expected=f"a topic of {SCAN}" if topic is None else f"{SCAN} on the topic {topic}",
         received=f"the topics {listed or '(none)'}",
-        remedy="name one topic of scans",
+        remedy="name one topic of scans, point clouds or depth images",
     )
 
 
@@ -127,6 +135,40 @@ def _no_scan(topic: str) -> ScanError:
         expected=f"scans on {topic}, as in the index of the bag",
         received="none",
         remedy="reindex the bag, or record it again",
+    )
+
+
+def _load_points(bag: BagFile, topic: str, kind: str, n_most: int, given: GivenFrames) -> Recording:
+    """Read point clouds or depth images, one at a time: together they may not fit into memory."""
+    if given.T_base_laser is not None:
+        raise ScanError(
+            f"The height of a sensor counts on {topic}, and --laser-pose has none. Leave it out, "
+            "and record the static transforms."
+        )
+    tree = _transforms(bag, None)
+    first = next(bag.messages(kind, [topic]), None)
+    if first is None:
+        raise _no_scan(topic)
+    frame = to_frame(given.laser or first[1].header.frame_id)
+    base, odometry, notes = _odometry(bag, tree, frame, given, None)
+    T_base_sensor = None if base is None else tree.fixed(base, frame)
+    if T_base_sensor is None:
+        raise ScanError(
+            f"No fixed transforms lead from the base to {frame}, so the heights of points on "
+            f"{topic} are unknown. Record the static transforms, or name frames by --base-frame "
+            "and --laser-frame."
+        )
+    convert = converter(bag, topic, kind, T_base_sensor)
+    scans = []
+    for i, item in enumerate(islice(bag.messages(kind, [topic]), n_most + SORTED_AHEAD)):
+        sweep = _Sweep(*item)
+        with located(f"message {i} on {topic}"):
+            scans.append(convert(sweep.message, sweep.stamp))
+    order = ascending(np.array([scan.stamp for scan in scans]))
+    return Recording(
+        scans=tuple(scans[i] for i in order[:n_most].tolist()),
+        odometry=odometry,
+        notes=(*notes, *sorting_notes(order)),
     )
 
 

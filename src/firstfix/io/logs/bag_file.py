@@ -21,6 +21,9 @@ from firstfix.io.logs.checks import unreadable
 SCAN = "sensor_msgs/msg/LaserScan"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 ODOMETRY = "nav_msgs/msg/Odometry"
+CLOUD = "sensor_msgs/msg/PointCloud2"
+DEPTH = "sensor_msgs/msg/Image"
+CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 
 # Before ROS Groovy: the same fields under another name.
 _OLD_NAMES = {"tf/msg/tfMessage": TRANSFORMS}

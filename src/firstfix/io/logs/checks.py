@@ -34,6 +34,8 @@ def located(where: str) -> Iterator[None]:
     except InputError as error:
         if isinstance(error, ScanError) and where in error.received:
             raise
+        if not error.expected:
+            raise ScanError(f"In {where}: {error}") from error
         raise ScanError(
             expected=error.expected,
             received=f"{error.received} in {where}",
