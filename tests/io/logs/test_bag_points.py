@@ -146,5 +146,7 @@ def test_a_damaged_cloud_is_named_by_its_number(bag) -> None:
     robot(bag, "velodyne", (0.0, 0.0, 0.5))
     add_cloud(bag, 1.0, [[1.0, 0.0, 0.0]])
     bag.entries[-1][3].width = 7
-    with pytest.raises(ScanError, match="message 0 on /points: The point cloud states 1 rows of 84 bytes"):
+    with pytest.raises(
+        ScanError, match="message 0 on /points: The point cloud states 1 rows of 84 bytes"
+    ):
         load_recording(bag.write(), topic="/points")
