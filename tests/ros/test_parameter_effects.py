@@ -27,10 +27,18 @@ DOCUMENTED = re.findall(r"^\| `([\w.]+)` \|", PAGE.read_text(encoding="utf-8"), 
 
 BEAM = {"laser_model_type": "beam"}
 SKIP = {"laser_model_type": "likelihood_field_prob", "do_beamskip": True}
-START = {"set_initial_pose": True}
+ONE = {"belief.window": 1}
+TWO = ONE | {"monitor.decided_views": 2}
+START = {
+    "set_initial_pose": True,
+    "initial_pose.x": 3.0,
+    "initial_pose.y": 2.5,
+    "initial_pose.yaw": 0.4,
+}
 
 # Of each parameter: a value other than the default, and the parameters that it depends on. The
-# robot drives in a hall; where "in" says so, in one of four equal rooms.
+# robot drives in a hall; where "in" says so, it gets lost there, or
+# it is in one of four equal rooms.
 EFFECTS: dict[str, dict[str, Any]] = {
     "mode": {"to": "bootstrap"},
     "yaml_filename": {"to": "map.yaml"},
@@ -41,10 +49,10 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "map_topic": {"to": "floor_plan"},
     "first_map_only": {"to": True},
     "set_initial_pose": {"to": True},
-    "initial_pose.x": {"to": 1.9, "with": START},
-    "initial_pose.y": {"to": 1.9, "with": START},
-    "initial_pose.yaw": {"to": 1.0, "with": START},
-    "always_reset_initial_pose": {"to": True, "with": START | {"initial_pose.x": 1.9}},
+    "initial_pose.x": {"to": 7.0, "with": START},
+    "initial_pose.y": {"to": 5.5, "with": START},
+    "initial_pose.yaw": {"to": 3.0, "with": START},
+    "always_reset_initial_pose": {"to": True, "with": START},
     "saved_pose_file": {"to": "pose.json"},
     "save_pose_rate": {"to": -1.0, "with": {"saved_pose_file": "pose.json"}},
     "transform_tolerance": {"to": 0.2},
@@ -85,37 +93,52 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "random_seed": {"to": 7},
     "locate.max_poses": {"to": 1000},
     "locate.shortlist": {"to": 1},
-    "locate.hypotheses": {"to": 2, "in": "rooms"},
     "locate.unique_probability": {"to": 1.0},
     "monitor.doubtful_cost": {"to": 0.01},
     "monitor.contradiction_cost": {"to": 90.0},
     "monitor.lost_after_s": {"to": 0.1, "with": {"monitor.search_period_s": 1000.0}},
     "monitor.search_period_s": {"to": 1000.0},
     "monitor.confirmations": {"to": 5},
-    "monitor.new_view_m": {"to": 50.0, "in": "rooms"},
-    "monitor.new_view_rad": {"to": 0.05, "in": "rooms"},
+    "monitor.new_view_m": {"to": 50.0, "in": "a loss", "with": TWO | {"monitor.new_view_rad": 3.0}},
+    "monitor.new_view_rad": {"to": 0.01, "in": "a loss", "with": TWO | {"monitor.new_view_m": 50}},
     "monitor.rest_period_s": {"to": 0.05, "in": "rooms"},
     "monitor.correct_m": {"to": 0.01},
     "monitor.correct_rad": {"to": 0.003},
-    "monitor.decided_probability": {"to": 1.0, "with": {"locate.unique_probability": 1.0}},
     "monitor.decided_cost": {"to": 0.002},
-    "monitor.decided_views": {"to": 1, "in": "rooms", "with": {"monitor.decided_probability": 0.5}},
+    "monitor.decided_views": {"to": 1, "in": "a loss", "with": ONE},
+    "belief.window": {"to": 1, "in": "rooms"},
+    "belief.first_shortlist": {"to": 1, "in": "rooms"},
+    "belief.shortlist": {"to": 1, "in": "a loss"},
+    "belief.places": {"to": 2, "in": "rooms"},
+    "belief.sure_probability": {"to": 1.0},
 }
-REFUSED = {"recovery_alpha_slow": 0.1, "recovery_alpha_fast": 0.1}
+REFUSED = {"recovery_alpha_slow": 0.1, "recovery_alpha_fast": 0.1, "locate.hypotheses": 5}
 MOTION = SE2(0.3, 0.0, 0.1)
 
 
 class Drive:
     """A map, a robot that drives, slips and is carried away, and at last another map."""
 
-    def __init__(self, wire: Any, world: OccupancyGrid, start: SE2, carried_to: SE2) -> None:
+    def __init__(
+        self,
+        wire: Any,
+        world: OccupancyGrid,
+        start: SE2,
+        carried_to: SE2,
+        *,
+        blinded: int = 0,
+        scans: int = 20,
+    ) -> None:
         self.wire, self.world = wire, world
         robot = Speaker(wire, world, start)
         self.messages = [(Channel.TF_STATIC, robot.fixed()), (Channel.MAP, robot.map())]
-        for i in range(20):
+        for i in range(scans):
             if i in (8, 12):
                 robot.pose = robot.pose @ SE2(0.12, 0.1, 0.04) if i == 8 else carried_to
-            robot.report(lambda channel, message: self.messages.append((channel, message)))
+            tf, scan = robot.report(lambda channel, message: (channel, message))
+            if 0 <= i - 12 < blinded:  # it fits nowhere
+                scan[1].ranges = 2.0 + np.sin(np.arange(180.0) * i).astype(np.float32)
+            self.messages += [tf, scan]
             robot.move(MOTION if i % 2 else SE2.identity(), 0.25)
         robot.world = OccupancyGrid(world.cells[:-10].copy(), world.resolution, world.T_map_grid)
         self.messages.append((Channel.MAP, robot.map()))
@@ -143,6 +166,9 @@ def drives(ros2: Any, hall_plan: OccupancyGrid) -> dict[str, Drive]:
     rooms = identical_rooms(4)
     return {
         "hall": Drive(ros2, hall_plan, SE2(3.0, 2.5, 0.4), SE2(7.5, 5.0, -1.5)),
+        "a loss": Drive(
+            ros2, hall_plan, SE2(1.5, 1.5, 0.2), SE2(6.9, 3.0, 1.5), blinded=11, scans=32
+        ),
         "rooms": Drive(ros2, rooms, SE2(2.0, 2.0, 0.4), SE2(2.5, 2.5, 0.4)),
     }
 

@@ -23,8 +23,13 @@ _POSE_PARTS = ("x", "y", "yaw")
 _FRAMES = ("base_frame_id", "odom_frame_id", "global_frame_id")
 # The filter's parameters have no prefix: users know them by Nav2's names.
 _NODE, _FILTER = "node", "amcl"
-# The localizer of a node injects no random particles.
-_WITHOUT_EFFECT = ("recovery_alpha_slow", "recovery_alpha_fast")
+_NO_INJECTION = "a node recovers by searching the whole map for the scan, not by random particles"
+# Parameters that have no effect in a node, and why.
+_WITHOUT_EFFECT = {
+    "recovery_alpha_slow": _NO_INJECTION,
+    "recovery_alpha_fast": _NO_INJECTION,
+    "locate.hypotheses": "a node keeps as many places as belief.places says",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,16 +105,15 @@ def configured(values: Mapping[str, Any]) -> NodeConfig:
         If a name is unknown, a value has the wrong type or is out of its range, or a parameter has
         no effect in a node.
     """
-    config = _config(values)
-    for name in _WITHOUT_EFFECT:
-        if getattr(config.localizer.amcl, name) > 0.0:
+    for name, reason in _WITHOUT_EFFECT.items():
+        default = defaults()[name]
+        if values.get(name, default) != default:
             raise InputError(
-                expected=f"{name} of 0: a node recovers by searching the whole map for the scan, "
-                "not by random particles",
-                received=f"{getattr(config.localizer.amcl, name)}",
+                expected=f"{name} of {default}: {reason}",
+                received=f"{values[name]!r:.60}",
                 remedy="remove it",
             )
-    return config
+    return _config(values)
 
 
 def _config(values: Mapping[str, Any]) -> NodeConfig:
