@@ -8,7 +8,9 @@ import pytest
 import firstfix
 
 PUBLIC = [
+    "All",
     "AmclConfig",
+    "AnyOf",
     "Event",
     "Evidence",
     "FirstfixError",
@@ -28,12 +30,14 @@ PUBLIC = [
     "MotionModel",
     "MotionRequest",
     "Mounting",
+    "Near",
     "NewMap",
     "NoMotionUpdate",
     "OccupancyGrid",
     "Odometry",
     "PoseHint",
     "Recording",
+    "Region",
     "Reset",
     "SE2",
     "ScanError",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from firstfix.amcl.config import AmclConfig, MotionModel, SensorModel
+    from firstfix.belief.prior import All, AnyOf, Near, Region
     from firstfix.core.errors import FirstfixError, InputError, MapError, ScanError
     from firstfix.core.estimate import Evidence, Hypothesis, LocateResult, SearchReport, Verdict
     from firstfix.core.grid import OccupancyGrid
@@ -40,7 +41,9 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [  # noqa: RUF022 - in plain alphabetical order
+    "All",
     "AmclConfig",
+    "AnyOf",
     "Event",
     "Evidence",
     "FirstfixError",
@@ -60,12 +63,14 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "MotionModel",
     "MotionRequest",
     "Mounting",
+    "Near",
     "NewMap",
     "NoMotionUpdate",
     "OccupancyGrid",
     "Odometry",
     "PoseHint",
     "Recording",
+    "Region",
     "Reset",
     "SE2",
     "ScanError",
@@ -94,6 +99,7 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
 # A name is imported at its first use: numba alone takes longer than 0.3 s to import.
 _MODULES = {
     "amcl.config": ("AmclConfig", "MotionModel", "SensorModel"),
+    "belief.prior": ("All", "AnyOf", "Near", "Region"),
     "core.errors": ("FirstfixError", "InputError", "MapError", "ScanError"),
     "core.estimate": ("Evidence", "Hypothesis", "LocateResult", "SearchReport", "Verdict"),
     "core.grid": ("OccupancyGrid",),

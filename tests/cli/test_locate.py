@@ -39,8 +39,8 @@ def test_json_has_the_agreed_keys_and_the_true_pose(cli, unique: Files) -> None:
     (line,) = ended.out.splitlines()
     answer = strict_json(line)
     assert list(answer) == [
-        "index", "verdict", "reason", "pose", "covariance", "hypotheses", "search", "elapsed_s",
-        "error",
+        "index", "verdict", "reason", "pose", "covariance", "hypotheses",
+        "probability_without_prior", "search", "elapsed_s", "error",
     ]  # fmt: skip
     assert (answer["index"], answer["verdict"]) == (1, "UNIQUE")
     np.testing.assert_allclose(answer["pose"], [7.5, 5.0, -2.0], atol=0.05)

@@ -24,13 +24,13 @@ from firstfix.belief.judge import Judgement, Rule, judge
 from firstfix.belief.merge import merge
 from firstfix.belief.place import listed_places
 from firstfix.belief.planar import between, compose, in_cells, to_map
-from firstfix.belief.prior import Prior
 from firstfix.belief.tracks import Tracks, at_rest, follow, look_again, trace_back
 from firstfix.belief.view import Observation, View
 from firstfix.core.estimate import Hypothesis, SearchReport, Verdict
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS
+from firstfix.global_localization.prior import Prior
 
 # A view brings news where the robot has moved or turned by this much.
 NEWS_M = 0.3

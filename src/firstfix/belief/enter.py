@@ -16,14 +16,10 @@ from firstfix.core.estimate import SearchReport
 from firstfix.fields.map_fields import MapFields
 from firstfix.fields.range_table import DIRECTIONS
 from firstfix.fields.search_grid import MAX_POSITIONS
+from firstfix.global_localization.prior import DEEPER, NEAR_LOG
 from firstfix.global_localization.search import search
 
 _ALL_POSES = MAX_POSITIONS * DIRECTIONS
-
-# With a hint, the search is asked for more places, so that some are near it.
-_DEEPER = 20
-# Log-likelihood from which on a place counts as near all hints.
-_NEAR = -1.0
 
 
 def propose(
@@ -58,7 +54,7 @@ def propose(
     seen = window[-1]
     sensor = seen.sensor
     most = config.first_shortlist if len(window) == 1 else config.shortlist
-    depth = most * _DEEPER if hints else most
+    depth = most * DEEPER if hints else most
     candidates, report = search(sensor.beams, fields, depth, _ALL_POSES)
     poses = compose(candidates.poses, inverse(sensor.T_base_laser))
     if hints:
@@ -76,5 +72,5 @@ def _best_and_hinted(
     fields: MapFields,
 ) -> NDArray[np.int64]:
     """Return the indices of the first places, and of as many that are near the hints."""
-    near = np.flatnonzero(hint_logs(poses, seen, hints, fields.grid) >= _NEAR)
+    near = np.flatnonzero(hint_logs(poses, seen, hints, fields.grid) >= NEAR_LOG)
     return np.unique(np.concatenate([np.arange(min(most, len(poses))), near[:most]]))

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.belief.planar import between, compose, to_map
-from firstfix.belief.prior import Prior
 from firstfix.belief.view import Observation
 from firstfix.core.grid import OccupancyGrid
+from firstfix.global_localization.prior import Prior
 
 # After so long a way odometry no longer tells where the prior was.
 _FADES_M = 10.0

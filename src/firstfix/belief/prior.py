@@ -10,33 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from firstfix.core.arguments import as_pose
 from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
+from firstfix.global_localization.prior import Prior
 
 FLOOR = math.log(1e-3)
 """Log-likelihood far outside a prior: a thousand to one."""
-
-
-class Prior(Protocol):
-    """A log-likelihood over poses."""
-
-    def log_likelihood(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return log-likelihoods, shape (n,), from `FLOOR` to 0 for each prior that is added.
-
-        Parameters
-        ----------
-        poses : ndarray, shape (n, 3)
-            x (m), y (m), yaw (rad) of the base in the map frame.
-        """
-
-    def check(self, grid: OccupancyGrid) -> None:
-        """Raise InputError if no robot of this map can be there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +31,7 @@ class Near:
     Parameters
     ----------
     pose : SE2
-        ``T_map_base``.
+        ``T_map_base``. A tuple (x, y, yaw) in metres and radians is accepted.
     radius : float
         Distance that is as likely as none, m, above 0.
     angle : float
@@ -56,6 +41,12 @@ class Near:
     ------
     InputError
         If the radius or the angle is not above 0.
+
+    Examples
+    --------
+    >>> result = ff.ScanMatcher(grid).locate(scan, prior=ff.Near((2.0, 1.5, 0.0), radius=1.0))
+    >>> result.verdict, result.probability_without_prior > 0.95
+    (<Verdict.UNIQUE: 'UNIQUE'>, True)
     """
 
     pose: SE2
@@ -69,6 +60,7 @@ class Near:
                 received=f"radius {self.radius} m, angle {self.angle} rad",
                 remedy="give the distance by which the pose may be wrong, such as 1 m",
             )
+        object.__setattr__(self, "pose", as_pose(self.pose, "pose"))
 
     def log_likelihood(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return log-likelihoods of poses in the map frame, shape (n,)."""
@@ -112,6 +104,12 @@ class Region:
     ------
     InputError
         If these are not three or more finite corners around an area.
+
+    Examples
+    --------
+    >>> hall = ff.Region([(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)])
+    >>> ff.ScanMatcher(grid).locate(scan, prior=hall).verdict
+    <Verdict.UNIQUE: 'UNIQUE'>
     """
 
     polygon: Sequence[tuple[float, float]]
@@ -162,6 +160,12 @@ class All:
     ----------
     priors : tuple of Prior
         In any order.
+
+    Examples
+    --------
+    >>> both = ff.All((ff.Near((2.0, 1.5, 0.0), 3.0), ff.Near((3.0, 1.5, 0.0), 3.0)))
+    >>> both.log_likelihood(np.array([[2.5, 1.5, 0.0]]))
+    array([0.])
     """
 
     priors: tuple[Prior, ...]
@@ -172,6 +176,58 @@ class All:
         for prior in self.priors:
             logs += prior.log_likelihood(poses)
         return logs
+
+    def check(self, grid: OccupancyGrid) -> None:
+        """Raise InputError if one of them does not fit the map."""
+        for prior in self.priors:
+            prior.check(grid)
+
+
+@dataclass(frozen=True, slots=True)
+class AnyOf:
+    """One of several priors holds, such as one of the docks of a robot.
+
+    Parameters
+    ----------
+    priors : tuple of Prior
+        At least one.
+    weights : tuple of float, optional
+        How likely each is against the others, above 0; by default all are equally likely.
+
+    Raises
+    ------
+    InputError
+        If there is no prior, or not one weight above 0 for each.
+
+    Examples
+    --------
+    >>> docks = ff.AnyOf((ff.Near((2.0, 1.5, 0.0), 1.0), ff.Near((9.0, 1.5, 0.0), 1.0)))
+    >>> docks.log_likelihood(np.array([[2.0, 1.5, 0.0], [9.0, 1.5, 0.0], [5.0, 1.5, 0.0]])).round(1)
+    array([ 0. ,  0. , -6.9])
+    """
+
+    priors: tuple[Prior, ...]
+    weights: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        weights = self.weights or (1.0,) * len(self.priors)
+        good = all(0.0 < weight < math.inf for weight in weights)
+        if not self.priors or len(weights) != len(self.priors) or not good:
+            raise InputError(
+                f"{len(self.priors)} priors with the weights {weights} cannot be used. Give at "
+                "least one prior, and one weight above 0 for each."
+            )
+        object.__setattr__(self, "weights", weights)
+
+    def log_likelihood(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return log-likelihoods of poses in the map frame, shape (n,): those of the best prior."""
+        most = max(self.weights)
+        logs = [
+            prior.log_likelihood(poses) + math.log(weight / most)
+            for prior, weight in zip(self.priors, self.weights, strict=True)
+        ]
+        best: NDArray[np.float64] = np.maximum(FLOOR, np.max(logs, axis=0))
+        return best
 
     def check(self, grid: OccupancyGrid) -> None:
         """Raise InputError if one of them does not fit the map."""

@@ -10,13 +10,13 @@ from dataclasses import replace
 from firstfix.belief.at_rest import longest_consistent
 from firstfix.belief.belief import REST_M, REST_RAD, Belief, begin, brings_news, update
 from firstfix.belief.config import BeliefConfig
-from firstfix.belief.prior import Prior
 from firstfix.belief.view import View
 from firstfix.core.errors import InputError
 from firstfix.core.estimate import LocateResult
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.prior import Prior
 from firstfix.global_localization.sensors import at_one_time, instants
 
 # No robot in a building is faster; and a way this long between two scans hides what lies between.

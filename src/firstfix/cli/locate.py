@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from firstfix.cli.prior_options import NearPoses, Radius, RegionText, prior_of
 from firstfix.cli.progress import progress, working
 from firstfix.cli.sensor_options import BaseFrame, LaserFrame, LaserPose, Topics, read_log
 from firstfix.core.errors import InputError, ScanError
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from firstfix.core.estimate import Hypothesis, LocateResult
     from firstfix.core.recording import Recording
     from firstfix.core.se2 import SE2
+    from firstfix.global_localization.prior import Prior
     from firstfix.global_localization.scan_matcher import ScanMatcher
 
 NO_ANSWER = 1
@@ -47,6 +49,9 @@ def locate(
     laser_pose: LaserPose = None,
     base_frame: BaseFrame = None,
     laser_frame: LaserFrame = None,
+    near: NearPoses = None,
+    radius: Radius = None,
+    region: RegionText = None,
 ) -> None:
     """Find the pose at which a scan was taken, anywhere in the map.
 
@@ -55,6 +60,7 @@ def locate(
     is UNIQUE and 1 if it is not.
     """
     _check_options(index, every, plot)
+    prior = prior_of(map_path, near, radius, region)
     from firstfix.core.estimate import Verdict
     from firstfix.io.maps.map_server import load_map
     from firstfix.lab.experiments.case import truth_at
@@ -80,7 +86,7 @@ def locate(
     with progress(0 if sys.stdout.isatty() else len(chosen), "locating") as done:
         for i in chosen:
             truth = truth_at(recording, instants[i][0])
-            result = _located(matcher, recording, instants[i])
+            result = _located(matcher, recording, instants[i], prior)
             if as_lines:
                 typer.echo(json.dumps(result.to_dict(i, truth), allow_nan=False))
             else:
@@ -107,13 +113,15 @@ def _check_options(index: int | None, every: bool, plot: Path | None) -> None:
         check_picture(plot)
 
 
-def _located(matcher: ScanMatcher, recording: Recording, instant: tuple[int, ...]) -> LocateResult:
+def _located(
+    matcher: ScanMatcher, recording: Recording, instant: tuple[int, ...], prior: Prior | None
+) -> LocateResult:
     """Locate the scans of one instant together, moved to one time by odometry where it is known."""
     scans, odometry = [recording.scans[i] for i in instant], recording.odometry
     if len(scans) == 1 or odometry is None:
-        return matcher.locate(scans)
+        return matcher.locate(scans, prior=prior)
     poses = [pose for scan in scans if (pose := odometry.at(scan.stamp)) is not None]
-    return matcher.locate(scans, T_odom_base=poses if len(poses) == len(scans) else None)
+    return matcher.locate(scans, poses if len(poses) == len(scans) else None, prior)
 
 
 def _only(count: int, index: int) -> range:

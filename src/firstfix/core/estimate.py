@@ -176,6 +176,9 @@ class LocateResult:
         The map that was searched, for pictures.
     scans : tuple of LaserScan
         The scans, for pictures.
+    probability_without_prior : float or None
+        Probability of the best hypothesis by the scan alone; None where there was no prior, or
+        several scans of one sensor.
 
     Examples
     --------
@@ -193,6 +196,7 @@ class LocateResult:
     elapsed_s: float
     grid: OccupancyGrid | None = field(default=None, repr=False)
     scans: tuple[LaserScan, ...] = field(default=(), repr=False)
+    probability_without_prior: float | None = None
 
     @property
     def best(self) -> Hypothesis | None:
@@ -222,7 +226,8 @@ class LocateResult:
         dict
             ``index``, ``verdict``, ``reason``, ``pose`` [x (m), y (m), yaw (rad)] and
             ``covariance`` of the best hypothesis whatever the verdict (None if there is none),
-            ``hypotheses``, ``search``, ``elapsed_s``, ``error`` {"m", "deg"} (None without truth).
+            ``hypotheses``, ``probability_without_prior``, ``search``, ``elapsed_s``,
+            ``error`` {"m", "deg"} (None without truth).
             No NaN, no infinity.
         """
         places = [hypothesis.to_dict() for hypothesis in self.hypotheses]
@@ -237,6 +242,7 @@ class LocateResult:
             "pose": places[0]["pose"] if places else None,
             "covariance": places[0]["covariance"] if places else None,
             "hypotheses": places,
+            "probability_without_prior": self.probability_without_prior,
             "search": asdict(self.search),
             "elapsed_s": self.elapsed_s,
             "error": error,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from firstfix.core.angles import wrap
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
@@ -29,6 +30,38 @@ def to_cells(grid: OccupancyGrid, scan: LaserScan, T_map_base: SE2) -> NDArray[n
     """
     T_grid_laser = grid.T_map_grid.inverse() @ T_map_base @ scan.T_base_laser
     return T_grid_laser.as_array() / [grid.resolution, grid.resolution, 1.0]
+
+
+def bases_in_map(
+    grid: OccupancyGrid, scan: LaserScan, poses: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Convert poses of the sensor in cells to poses of the base in the map; `to_map` for many.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The map.
+    scan : LaserScan
+        Has the sensor's pose on the base.
+    poses : ndarray, shape (n, 3)
+        x, y (cells), heading (rad) of the sensor in the grid.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        x (m), y (m), yaw (rad) of the base in the map frame.
+    """
+    x, y = grid.to_map(poses[:, :2]).T
+    yaw = poses[:, 2] + grid.T_map_grid.yaw
+    T_laser_base = scan.T_base_laser.inverse()
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.column_stack(
+        [
+            x + cos * T_laser_base.x - sin * T_laser_base.y,
+            y + sin * T_laser_base.x + cos * T_laser_base.y,
+            wrap(yaw + T_laser_base.yaw),
+        ]
+    )
 
 
 def to_map(

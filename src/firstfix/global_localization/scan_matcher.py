@@ -21,6 +21,7 @@ from firstfix.global_localization.beams import FEWEST_HITS
 from firstfix.global_localization.config import LocateConfig, Method
 from firstfix.global_localization.exhaustive import BASIC, FAST, ExhaustiveSearch
 from firstfix.global_localization.places import distinct_places
+from firstfix.global_localization.prior import PlacePrior, Prior
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.scoring import score_poses, search_locally
 from firstfix.global_localization.search import search
@@ -95,6 +96,7 @@ class ScanMatcher:
         self,
         scan: LaserScan | Sequence[LaserScan],
         T_odom_base: Sequence[SE2] | None = None,
+        prior: Prior | None = None,
     ) -> LocateResult:
         """Find where in the map a scan was taken, or the newest of several.
 
@@ -106,6 +108,9 @@ class ScanMatcher:
             All are judged together.
         T_odom_base : sequence of SE2, optional
             Odometry at each of several scans; by default the robot stood still.
+        prior : Prior, optional
+            What is known of the pose at the first scan: `Near`, `Region`, `AnyOf`, `All`. Strong
+            evidence of the scan overrules it.
 
         Returns
         -------
@@ -115,41 +120,48 @@ class ScanMatcher:
         Raises
         ------
         InputError
-            If several scans and their odometry do not belong together, or the method takes one
-            scan only.
+            If several scans and their odometry do not belong together, the prior does not fit the
+            map, or the method takes one scan only and no prior.
         """
         scans = as_scans(scan)
-        if len(scans) == 1:
-            result = self._locate_one(scans[0])
+        if prior is not None:
+            prior.check(self.fields.grid)
+        if self._exhaustive is not None:
+            result = self._locate_by_paper(scans, prior)
+        elif len(scans) == 1:
+            result = locate(scans, self.fields, self.config, prior)
         else:
-            result = self._locate_several(scans, T_odom_base)
+            result = self._locate_several(scans, T_odom_base, prior)
         return replace(result, grid=self.fields.grid)
 
     def __repr__(self) -> str:
         return f"<ScanMatcher {self.method.value} in {self.fields.grid!r}>"
 
-    def _locate_one(self, scan: LaserScan) -> LocateResult:
-        if self._exhaustive is not None:
-            return replace(self._exhaustive.locate(scan), scans=(scan,))
-        return locate((scan,), self.fields, self.config)
+    def _locate_by_paper(self, scans: tuple[LaserScan, ...], prior: Prior | None) -> LocateResult:
+        assert self._exhaustive is not None  # noqa: S101 - by the caller
+        if len(scans) > 1 or prior is not None:
+            what = "several scans" if len(scans) > 1 else "a prior"
+            raise InputError(
+                expected=f'method "fast" for {what}',
+                received=f'method "{self.method.value}"',
+                remedy="give one scan alone, or use the default method",
+            )
+        return replace(self._exhaustive.locate(scans[0]), scans=scans)
 
     def _locate_several(
-        self, scans: Sequence[LaserScan], T_odom_base: Sequence[SE2] | None
+        self,
+        scans: Sequence[LaserScan],
+        T_odom_base: Sequence[SE2] | None,
+        prior: Prior | None,
     ) -> LocateResult:
         # The belief is built on this package; only this method of the matcher is built on it.
         from firstfix.belief.several import locate_several
 
-        if self._exhaustive is not None:
-            raise InputError(
-                expected='method "fast" for several scans',
-                received=f'method "{self.method.value}"',
-                remedy="give one scan, or use the default method",
-            )
         odometry = [SE2.identity()] * len(scans) if T_odom_base is None else T_odom_base
         poses = [as_pose(pose, "T_odom_base") for pose in odometry]
         if len(instants(scans)) == 1:
-            return locate(at_one_time(scans, poses), self.fields, self.config)
-        return locate_several(scans, poses, self.fields)
+            return locate(at_one_time(scans, poses), self.fields, self.config, prior)
+        return locate_several(scans, poses, self.fields, prior)
 
     def score_poses(self, scan: LaserScan, poses: Sequence[SE2]) -> tuple[Hypothesis, ...]:
         """Score poses by a scan: `firstfix.global_localization.scoring.score_poses`.
@@ -188,7 +200,12 @@ class ScanMatcher:
         return search_locally(scan, as_pose(T_map_base, "T_map_base"), self.fields)
 
 
-def locate(scans: Sequence[LaserScan], fields: MapFields, config: LocateConfig) -> LocateResult:
+def locate(
+    scans: Sequence[LaserScan],
+    fields: MapFields,
+    config: LocateConfig,
+    prior: Prior | None = None,
+) -> LocateResult:
     """Search, refine, verify, judge.
 
     Parameters
@@ -199,6 +216,8 @@ def locate(scans: Sequence[LaserScan], fields: MapFields, config: LocateConfig) 
         The prepared map.
     config : LocateConfig
         Settings.
+    prior : Prior, optional
+        Of the pose of the base in the map.
 
     Returns
     -------
@@ -214,28 +233,41 @@ def locate(scans: Sequence[LaserScan], fields: MapFields, config: LocateConfig) 
             sum(map(len, scans)), hits, FEWEST_HITS, time.perf_counter() - started
         )
 
-    candidates, report = search(beams, fields, config.shortlist, config.max_poses)
-    poses = refine_on_field(candidates.poses, beams, fields)
-    first_look = verify(poses, beams.thinned(FIRST_LOOK_BEAMS), fields)
-    poses = poses[distinct_places(poses, first_look.scores, resolution, SECOND_LOOK_PLACES)]
-    second_look = verify(poses, beams, fields)
-    ranked = distinct_places(poses, second_look.scores, resolution, config.hypotheses)
-    poses = poses[ranked[: worth_listing(second_look.scores[ranked], len(beams))]]
+    known = PlacePrior(prior, fields.grid, scan, len(beams))
+    depth = known.depth(config.shortlist)
+    candidates, report = search(beams, fields, depth, config.max_poses)
+    poses = refine_on_field(known.chosen(candidates.poses, config.shortlist), beams, fields)
+    first_look = known.weighed(verify(poses, beams.thinned(FIRST_LOOK_BEAMS), fields))
+    poses = poses[distinct_places(poses, first_look, resolution, SECOND_LOOK_PLACES)]
+    second_look = known.weighed(verify(poses, beams, fields))
+    ranked = distinct_places(poses, second_look, resolution, config.hypotheses)
+    poses = poses[ranked[: worth_listing(second_look[ranked], len(beams))]]
     on_rays, covariances = refine_on_rays(poses, beams, fields)
     # Rays are more precise, but worse in a map with smeared walls: keep the better pose of the two.
     poses = np.concatenate([on_rays, poses])
     covariances = np.concatenate([covariances, covariances])
     verification = verify(poses, beams, fields)
-    ranked = distinct_places(poses, verification.scores, resolution, config.hypotheses)
-    probabilities = place_probabilities(verification.scores[ranked], len(beams))
+    weighed = known.weighed(verification)
+    ranked = distinct_places(poses, weighed, resolution, config.hypotheses)
+    probabilities = place_probabilities(weighed[ranked], len(beams))
 
     hypotheses = tuple(
         verified_place(fields.grid, scan, verification, int(i), covariances[i], float(probability))
         for i, probability in zip(ranked, probabilities, strict=True)
     )
     verdict, reason = _judge(verification, ranked, probabilities, report, config)
-    elapsed_s = time.perf_counter() - started
-    return LocateResult(verdict, reason, hypotheses, report, elapsed_s, scans=tuple(scans))
+    result = LocateResult(verdict, reason, hypotheses, report, 0.0, scans=tuple(scans))
+    if prior is not None:
+        by_scan = place_probabilities(verification.scores[ranked], len(beams))
+        result = _with_share_of_prior(result, float(by_scan[0]))
+    return replace(result, elapsed_s=time.perf_counter() - started)
+
+
+def _with_share_of_prior(result: LocateResult, by_scan: float) -> LocateResult:
+    """State how likely the best place is by the scan alone."""
+    both = result.hypotheses[0].probability
+    share = f"; {by_scan:.0%} likely by the scan alone, {both:.0%} with the prior"
+    return replace(result, reason=result.reason + share, probability_without_prior=by_scan)
 
 
 def worth_listing(scores: NDArray[np.float64], beams: int) -> int:

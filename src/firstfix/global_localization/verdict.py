@@ -47,6 +47,25 @@ def place_probabilities(scores: NDArray[np.float64], beams: int) -> NDArray[np.f
     return likelihoods[:-1]
 
 
+def with_prior(
+    scores: NDArray[np.float64], logs: NDArray[np.float64], beams: int
+) -> NDArray[np.float64]:
+    """Return the costs whose likelihoods are those of the scan times those of a prior.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (n,)
+        Mean cost of a beam at each place, nats.
+    logs : ndarray, shape (n,)
+        Log-likelihood of each place by the prior.
+    beams : int
+        Number of beams behind each mean.
+    """
+    exponent = _EXPONENT * min(1.0, beams / _BEAMS_FOR_EXPONENT)
+    costs: NDArray[np.float64] = (scores + _FLOOR) * np.exp(-logs / exponent) - _FLOOR
+    return costs
+
+
 def log_likelihoods(scores: NDArray[np.float64], beams: int) -> NDArray[np.float64]:
     """Turn mean costs into log-likelihoods, up to a constant.
 

@@ -19,7 +19,6 @@ from firstfix.belief.belief import (
     with_prior,
 )
 from firstfix.belief.config import BeliefConfig
-from firstfix.belief.prior import Prior
 from firstfix.belief.view import View
 from firstfix.core.estimate import Hypothesis, Verdict
 from firstfix.core.scan import LaserScan
@@ -27,6 +26,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
 from firstfix.global_localization.places import is_same_place
+from firstfix.global_localization.prior import Prior
 from firstfix.global_localization.verdict import count_rivals
 
 # In the background a view each two metres watches a tracked pose at little cost.

@@ -1,0 +1,81 @@
+"""What is known of the robot's place before the scan, in the answer to one scan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.scan import LaserScan
+from firstfix.global_localization.frames import bases_in_map
+from firstfix.global_localization.verdict import with_prior
+from firstfix.global_localization.verify import Verification
+
+# With a prior the search lists more places, so that some are near it.
+DEEPER = 20
+# Log-likelihood down to which a place is near a prior.
+NEAR_LOG = -1.0
+
+
+class Prior(Protocol):
+    """A log-likelihood over poses."""
+
+    def log_likelihood(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return log-likelihoods, shape (n,), at most 0 where all is as good as can be.
+
+        Parameters
+        ----------
+        poses : ndarray, shape (n, 3)
+            x (m), y (m), yaw (rad) of the base in the map frame.
+        """
+
+    def check(self, grid: OccupancyGrid) -> None:
+        """Raise InputError if no robot of this map can be there."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PlacePrior:
+    """A prior for poses of a sensor in the grid.
+
+    Parameters
+    ----------
+    prior : Prior or None
+        Of the pose of the base in the map; None if nothing is known.
+    grid : OccupancyGrid
+        The map.
+    scan : LaserScan
+        Of the sensor; has its pose on the robot.
+    beams : int
+        Number of beams behind the costs.
+    """
+
+    prior: Prior | None
+    grid: OccupancyGrid
+    scan: LaserScan
+    beams: int
+
+    def depth(self, shortlist: int) -> int:
+        """Return how many places the search should list."""
+        return shortlist if self.prior is None else DEEPER * shortlist
+
+    def chosen(self, poses: NDArray[np.float64], shortlist: int) -> NDArray[np.float64]:
+        """Keep the first poses, shape (n, 3), and as many of the others that are near the prior."""
+        if self.prior is None:
+            return poses
+        near = np.flatnonzero(self._logs(poses) >= NEAR_LOG)
+        first = np.arange(min(shortlist, len(poses)))
+        kept: NDArray[np.float64] = poses[np.unique(np.concatenate([first, near[:shortlist]]))]
+        return kept
+
+    def weighed(self, verification: Verification) -> NDArray[np.float64]:
+        """Return the costs, shape (n,), that stand for scan and prior together."""
+        if self.prior is None:
+            return verification.scores
+        return with_prior(verification.scores, self._logs(verification.poses), self.beams)
+
+    def _logs(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        assert self.prior is not None  # noqa: S101 - by the callers
+        return self.prior.log_likelihood(bases_in_map(self.grid, self.scan, poses))
