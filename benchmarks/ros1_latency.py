@@ -128,7 +128,7 @@ def _publisher(topic: str, kind: str, *, latch: bool = False) -> rospy.Publisher
 def find(lab: Lab, robot: Robot, places: int) -> None:
     poses = Poses("initialpose")
     node = lab.node()
-    node.wait_to_say("SEARCHING")
+    node.wait_for_output("SEARCHING")
     forget = rospy.ServiceProxy("reinitialize_global_localization", Empty)
     taken, untold = [], 0
     for _ in range(places):
@@ -158,7 +158,7 @@ def drive(lab: Lab, robot: Robot, rate: float, seconds: float) -> None:
 
     poses = Poses("amcl_pose")
     node = lab.node("_mode:=full")
-    node.wait_to_say("SEARCHING")
+    node.wait_for_output("SEARCHING")
     meter = Meter(node)
     sent: dict[float, float] = {}
     began = time.time()

@@ -120,7 +120,7 @@ class Soak:
     def _sample(self, now: float) -> None:
         for name, part in list(self._system.parts.items()):
             if not part.is_running:
-                self.deaths.append({"who": name, "at": now, "said": part.said[-2000:]})
+                self.deaths.append({"who": name, "at": now, "said": part.output[-2000:]})
                 self._system.parts.pop(name).end()
                 getattr(self._system, f"start_{name}")()
                 print(f"{now - self.began:7.1f} s  {name} DIED BY ITSELF", flush=True)
@@ -137,14 +137,14 @@ class Soak:
 
     def people_walk(self) -> tuple[str, float]:
         """Replace the people by some who walk."""
-        self._system.tell(do="people", count=int(self._rng.integers(3, 10)), manner="walk")
+        self._system.command(do="people", count=int(self._rng.integers(3, 10)), manner="walk")
         return "people walk", 0.0
 
     def people_crowd(self) -> tuple[str, float]:
         """Surround the robot by people who move with it."""
-        self._system.tell(do="people", count=int(self._rng.integers(2, 6)), manner="surround")
+        self._system.command(do="people", count=int(self._rng.integers(2, 6)), manner="surround")
         seconds = self._between(4.0, 10.0)
-        self._later(seconds, lambda: self._system.tell(do="people", count=2, manner="walk"))
+        self._later(seconds, lambda: self._system.command(do="people", count=2, manner="walk"))
         return "a crowd", seconds
 
     def scans_dropped(self) -> tuple[str, float]:
@@ -179,41 +179,41 @@ class Soak:
 
     def _wire(self, kind: str, topics: list[str], seconds: float, delay_s: float = 0.0) -> float:
         trouble = {"kind": kind, "topics": topics, "seconds": seconds, "delay_s": delay_s}
-        self._system.tell(do="wire", **trouble)
+        self._system.command(do="wire", **trouble)
         return seconds + delay_s
 
     def clock_ahead(self) -> tuple[str, float]:
         """Set the clock of the robot forward."""
         by = self._rng.choice([self._between(0.1, 2.0), self._between(2.0, 60.0), HOUR_S])
-        self._system.tell(do="clock", by=float(by))
+        self._system.command(do="clock", by=float(by))
         return "clock ahead", 0.0
 
     def clock_back(self) -> tuple[str, float]:
         """Set the clock of the robot back."""
         by = self._rng.choice([self._between(0.1, 2.0), self._between(2.0, 60.0), HOUR_S])
-        self._system.tell(do="clock", by=-float(by))
+        self._system.command(do="clock", by=-float(by))
         return "clock back", 0.0
 
     def kidnap(self) -> tuple[str, float]:
         """Teleport the robot; no sensor reports it."""
-        self._system.tell(do="teleport")
+        self._system.command(do="teleport")
         return "silent kidnap", 0.0
 
     def carry(self) -> tuple[str, float]:
         """Carry the robot elsewhere; the wheel drop reports it."""
         seconds = self._between(2.0, 5.0)
-        self._system.tell(do="carry", seconds=seconds)
+        self._system.command(do="carry", seconds=seconds)
         return "carried off", seconds
 
     def push(self) -> tuple[str, float]:
         """Push the robot; odometry does not measure it."""
         degrees = self._between(-40.0, 40.0)
-        self._system.tell(do="push", metres=self._between(0.2, 0.8), degrees=degrees)
+        self._system.command(do="push", metres=self._between(0.2, 0.8), degrees=degrees)
         return "pushed", 0.5
 
     def wrong_hint(self) -> tuple[str, float]:
         """Publish a wrong hint."""
-        self._system.tell(do="hint")
+        self._system.command(do="hint")
         return "wrong hint", 0.0
 
     def freeze(self) -> tuple[str, float]:
@@ -230,7 +230,7 @@ class Soak:
     def kill_node_and_kidnap(self) -> tuple[str, float]:
         """Carry the robot elsewhere while the node is not running."""
         seconds = self._kill("node", self._system.start_node)
-        self._system.tell(do="teleport")
+        self._system.command(do="teleport")
         return "kill node, kidnap meanwhile", seconds
 
     def kill_node_and_file(self) -> tuple[str, float]:

@@ -110,11 +110,11 @@ class System:
         url = f"ws://127.0.0.1:{self._port}/v1/live"
         self._start("viewer", HERE / "soak_observer.py", "page", self.seen, url)
 
-    def tell(self, **order: Any) -> None:
+    def command(self, **order: Any) -> None:
         """Send a command to the robot, if it runs."""
         if "robot" in self.parts:
             with contextlib.suppress(OSError):
-                self.parts["robot"].tell(**order)
+                self.parts["robot"].command(**order)
 
     def kill(self, name: str) -> None:
         """Kill a process that needs no time for it."""

@@ -94,7 +94,7 @@ def test_options_that_contradict_each_other(cli, unique: Files) -> None:
 
 
 @pytest.mark.parametrize("name", ["place.jpeg", "place"])
-def test_a_picture_of_no_known_kind(cli, unique: Files, name: str) -> None:
+def test_a_picture_of_an_unknown_format(cli, unique: Files, name: str) -> None:
     assert_one_line(cli("locate", *unique, "--plot", name), name)
     assert_one_line(cli("demo", "--plot", name), name)
     assert_one_line(cli("map", "show", unique[0], "--plot", name), name)

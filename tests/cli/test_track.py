@@ -177,7 +177,7 @@ def test_a_saved_pose_begins_the_next_part_of_a_drive(
     assert document["ape"]["max_m"] < 0.3
 
 
-def test_the_pose_is_saved_as_often_as_the_parameters_say(
+def test_the_pose_is_saved_at_the_rate_of_the_parameters(
     cli, files: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stamps: list[float] = []

@@ -28,7 +28,7 @@ LOOPBACK = (
 )
 # Types that are not what they claim to be must not keep the ears of the tests shut.
 NAMES_COUNT = "<Compatibility><IgnoreTypeInformation>1.16</IgnoreTypeInformation></Compatibility>"
-# A busy machine is not a bug: generous, since nobody waits so long when all is well.
+# A busy machine is not a bug: generous, because a working node never takes so long.
 PATIENCE_S = 240.0
 
 _counter = itertools.count(os.getpid() * 7)
@@ -36,13 +36,13 @@ Found = TypeVar("Found")
 
 
 def why_missing() -> str:
-    """Say why there can be no lab; empty if there can."""
+    """Return why these tests cannot run; empty if they can."""
     is_there = importlib.util.find_spec("cyclonedds") is not None
     return "" if is_there else "no cyclonedds: pip install 'firstfix[dds]'"
 
 
 def free_domain() -> int:
-    """Return the number of a domain in which nobody is."""
+    """Return the number of an unused domain."""
     while True:
         domain = 1 + next(_counter) % 100
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
@@ -65,7 +65,7 @@ class Program:
 
     @property
     def log(self) -> str:
-        """What it has said so far."""
+        """Its output so far."""
         return self._log.read_text(encoding="utf-8")
 
     def end(self, how: int = signal.SIGTERM) -> int:
@@ -142,7 +142,7 @@ class Lab:
 
 
 class Ear:
-    """A reader of one topic, with all that it has heard."""
+    """A reader of one topic, with all received messages."""
 
     def __init__(self, participant: Any, name: str, kind: str, *policies: Any) -> None:
         from cyclonedds.qos import Policy, Qos
@@ -156,21 +156,21 @@ class Ear:
         topic.data_type = Cdr
         xcdr1 = Policy.DataRepresentation(use_cdrv0_representation=True)
         self.reader = DataReader(participant, topic, Qos(xcdr1, Policy.History.KeepAll, *policies))
-        self._heard: list[Any] = []
+        self._received: list[Any] = []
 
     @property
-    def heard(self) -> list[Any]:
+    def received(self) -> list[Any]:
         """All messages so far."""
         samples = self.reader.take(10_000)
-        self._heard += [self._decode(s.data) for s in samples if s.sample_info.valid_data]
-        return self._heard
+        self._received += [self._decode(s.data) for s in samples if s.sample_info.valid_data]
+        return self._received
 
     def latched(self) -> Any:
         """Return the first message, as soon as it is there."""
-        return wait_for(lambda: self.heard)[0]
+        return wait_for(lambda: self.received)[0]
 
     def senders(self) -> list[Any]:
-        """Return what discovery says about those who publish."""
+        """Return the publishers that discovery has found."""
         handles = self.reader.get_matched_publications()
         return [self.reader.get_matched_publication_data(handle) for handle in handles]
 

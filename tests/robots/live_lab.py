@@ -101,7 +101,7 @@ def simulated(
 
 @dataclass
 class Drive:
-    """A robot that goes on by a scan only when the test says so."""
+    """A robot that takes one scan at a time, when the test asks for it."""
 
     robot: SimulatedRobot
     localizer: Localizer

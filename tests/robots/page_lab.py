@@ -43,7 +43,7 @@ def browser_path() -> str | None:
 
 
 def why_missing() -> str:
-    """Say what a visit needs and this machine lacks; empty for nothing."""
+    """Return what a browser test needs and this machine lacks; empty if nothing."""
     for package in ("playwright", "axe_playwright_python"):
         if importlib.util.find_spec(package) is None:
             return f"no {package} in {sys.executable}"
@@ -77,7 +77,7 @@ class Server:
         self.url = ""
 
     def start(self) -> Server:
-        """Start it, where it was before if it was; return when it says where it is."""
+        """Start the server, at its earlier port if it had one; return when its address is known."""
         command = [sys.executable, "-m", "firstfix", "serve", *self._arguments]
         self._process = subprocess.Popen(
             [*command, "--port", str(self._port)], stdout=subprocess.PIPE, text=True
@@ -144,15 +144,15 @@ class Visit:
 
     def __init__(self, context: BrowserContext, url: str) -> None:
         self.problems: list[str] = []
-        self._heard = 0
+        self._received = 0
         self._host = urlsplit(url).hostname
         self.page: Page = context.new_page()
-        self.page.on("console", self._hear)
+        self.page.on("console", self._on_message)
         self.page.on("pageerror", lambda error: self.problems.append(f"error: {error}"))
         self.page.on("request", self._see)
         self.page.goto(url)
 
-    def _hear(self, message: ConsoleMessage) -> None:
+    def _on_message(self, message: ConsoleMessage) -> None:
         if message.type in {"error", "warning"}:
             self.problems.append(f"{message.type}: {message.text}")
 
@@ -161,10 +161,10 @@ class Visit:
         if address.scheme not in {"blob", "data"} and address.hostname != self._host:
             self.problems.append(f"asks for {request.url}")
 
-    # ---- what the page says
+    # ---- texts of the page
 
     def data(self, name: str) -> str:
-        """Return what the page says of itself."""
+        """Return a data attribute of the page."""
         return self.page.get_attribute("#app", f"data-{name}") or ""
 
     def pose(self, name: str = "pose") -> tuple[float, ...]:
@@ -191,18 +191,18 @@ class Visit:
     def wait_for_fix(self) -> None:
         """Wait until a robot that is not held knows where it is."""
         self.wait_for_map()
-        wait_until(lambda: self.data("state") != "CONNECTING", lambda: "the robot says something")
+        wait_until(lambda: self.data("state") != "CONNECTING", lambda: "no state from the robot")
         if self.page.is_visible("#paused"):
             self.page.locator("#pause").click()
         self.wait_for_state("LOCALIZED")
-        self._heard = len(self.events())
+        self._received = len(self.events())
 
     def wait_for_event(self, pattern: str) -> re.Match[str]:
         """Wait for an event since the robot was found, and return what matched, newest first."""
 
         def found() -> re.Match[str] | None:
             texts = self.events()
-            news = texts[: len(texts) - self._heard]
+            news = texts[: len(texts) - self._received]
             return next(filter(None, (re.search(pattern, text) for text in news)), None)
 
         match: re.Match[str] = wait_until(found, lambda: f"{pattern}; {self.events()[:8]}")
@@ -224,7 +224,7 @@ class Visit:
             wait_until(lambda: self.scale != before, lambda: "it zooms")  # noqa: B023 - used at once
 
     def sees(self, x: float, y: float) -> bool:
-        """Tell whether a place of the map is visible, beside all bars and panels."""
+        """Return whether a place of the map is visible, not covered by bars and panels."""
         px, py = self.pixel(x, y)
         found = "([px, py]) => document.elementFromPoint(px, py)?.id === 'overlay'"
         return bool(self.page.evaluate(found, [px, py]))
@@ -258,7 +258,7 @@ class Visit:
 
     def colour(self, canvas: str, x: float, y: float) -> tuple[int, ...]:
         """Return the colour (r, g, b, a) of a canvas at a place of the map."""
-        # Through a copy: what is read often is not drawn fast any more, and the browser says so.
+        # Through a copy: browsers draw a canvas that is read often more slowly, and warn.
         script = """([canvas, px, py]) => {
             const found = document.getElementById(canvas);
             const ratio = found.width / found.clientWidth;

@@ -30,7 +30,7 @@ def play(
 ) -> None:
     """Play a scenario, stamped by the wall clock, and write the true pose of each scan.
 
-    A line of the file is ``[stamp, x, y, yaw]``. A robot that shall report later than now begins
+    A line of the file is ``[stamp, x, y, yaw]``. A robot that is to report later than now begins
     when its scenario is ready: kernels of the simulation may have to be compiled first.
     """
     next(run(scenario, grid, seed))

@@ -54,7 +54,7 @@ class Recorder:
         """Return the messages of a topic, in order."""
         return [message for where, message in self.published if where is topic]
 
-    def told(self, severity: Severity) -> list[str]:
+    def logged(self, severity: Severity) -> list[str]:
         """Return the lines of the log that are that grave."""
         return [text for how, text in self.lines if how is severity]
 
@@ -90,9 +90,9 @@ class Speaker:
         scan = self._lidar.scan(self.world, self.pose, self._rng, self.stamp)
         return self.wire.sent(laser_scan(self.wire.make, frame, scan))
 
-    def report(self, hear: Callable[[Channel, Any], Any]) -> list[Any]:
+    def report(self, callback: Callable[[Channel, Any], Any]) -> list[Any]:
         """Tell odometry, then the scan at the same time; return what was answered."""
-        return [hear(Channel.TF, self.tf()), hear(Channel.SCAN, self.scan())]
+        return [callback(Channel.TF, self.tf()), callback(Channel.SCAN, self.scan())]
 
 
 def wait_for(what: Callable[[], Any], seconds: float = 240.0) -> Any:

@@ -8,7 +8,7 @@ REQUIRED = set(filter(None, os.environ.get("FIRSTFIX_REQUIRE", "").split(",")))
 
 
 def missing(part: str, why: str) -> None:
-    """Skip for want of a part; fail where FIRSTFIX_REQUIRE says that it must be there."""
+    """Skip because of a missing dependency; fail if FIRSTFIX_REQUIRE names it."""
     if part in REQUIRED:
         pytest.fail(f"FIRSTFIX_REQUIRE asks for {part}: {why}")
     pytest.skip(why)

@@ -39,7 +39,7 @@ Line = dict[str, Any]
 
 
 def why_missing() -> str | None:
-    """Say what a ROS 1 needs and this machine lacks."""
+    """Return what ROS 1 needs and this machine lacks."""
     if importlib.util.find_spec("rospy") is None:
         return f"no rospy in {sys.executable}"
     lacking = [tool for tool in TOOLS if shutil.which(tool, path=PATH) is None]
@@ -58,7 +58,7 @@ def wait_until(
 
 
 class Program:
-    """A program of its own, and what it said."""
+    """A process and its output."""
 
     def __init__(self, command: list[str], environment: dict[str, str], log: Path) -> None:
         self._log = log
@@ -74,7 +74,7 @@ class Program:
             )
 
     @property
-    def said(self) -> str:
+    def output(self) -> str:
         """All of stdout and stderr so far."""
         return self._log.read_text(encoding="utf-8", errors="replace")
 
@@ -95,18 +95,18 @@ class Program:
         fields = Path(f"/proc/{self._process.pid}/stat").read_text(encoding="ascii").split()
         return (int(fields[13]) + int(fields[14])) / os.sysconf("SC_CLK_TCK")
 
-    def tell(self, **what: Any) -> None:
+    def command(self, **what: Any) -> None:
         """Write a line to its stdin."""
         assert self._process.stdin is not None
         self._process.stdin.write(json.dumps(what).encode() + b"\n")
 
-    def wait_to_say(self, text: str) -> None:
-        """Wait until it said something."""
+    def wait_for_output(self, text: str) -> None:
+        """Wait until its output contains a text."""
         wait_until(
-            lambda: text in self.said or not self.is_running,
-            lambda: f"{self._name} never said {text!r}, but: {self.said}",
+            lambda: text in self.output or not self.is_running,
+            lambda: f"{self._name} never printed {text!r}, but: {self.output}",
         )
-        assert text in self.said, f"{self._name} ended: {self.said}"
+        assert text in self.output, f"{self._name} ended: {self.output}"
 
     def send(self, what: signal.Signals) -> None:
         """Send a signal."""
@@ -115,7 +115,7 @@ class Program:
     def wait(self, seconds: float = PATIENCE_S) -> int:
         """Wait for its end, and return its exit status."""
         wait_until(
-            lambda: not self.is_running, lambda: f"{self._name} goes on: {self.said}", seconds
+            lambda: not self.is_running, lambda: f"{self._name} goes on: {self.output}", seconds
         )
         return self._process.returncode
 
@@ -150,7 +150,7 @@ class Master:
         }
 
     def start(self) -> None:
-        """Start it; nodes wait for it, and so does nobody here."""
+        """Start it, without waiting: nodes wait for it."""
         command = [str(shutil.which("roscore", path=PATH)), "-p", self._uri.rpartition(":")[2]]
         log = self._folder / f"roscore-{next(self._starts)}.log"
         self._program = Program(command, self.environment, log)
@@ -170,7 +170,7 @@ class Master:
         return self._ask("getParam", parameter)
 
     def pid_of(self, node: str) -> int:
-        """Return the process id of a node, as it says itself; 0 if nobody answers."""
+        """Return the process id that a node reports; 0 without an answer."""
         uri = self._ask("lookupNode", node)
         with contextlib.suppress(OSError), xmlrpc.client.ServerProxy(uri) as asked:
             answer: Any = asked.getPid("/lab")
@@ -202,7 +202,7 @@ def _free_port() -> int:
 
 
 class Watcher:
-    """What topics said, as `ros1_watcher.py` writes it."""
+    """The messages of topics, as written by `ros1_watcher.py`."""
 
     def __init__(self, path: Path, program: Program) -> None:
         self._path = path
@@ -215,7 +215,7 @@ class Watcher:
     def lines(
         self, topic: str, after: float = 0.0, about_after: float = 0.0, **expected: Any
     ) -> list[Line]:
-        """Return what a topic said since a time, about a time and later, with certain values."""
+        """Return messages since a time, stamped at a time or later, with certain values."""
         if not self._path.exists():
             return []
         # The last line may be half written.
@@ -235,7 +235,7 @@ class Watcher:
             lambda: self.lines(topic, after, **expected),
             lambda: (
                 f"no {topic} with {expected}, but {self.lines(topic, after)[-3:]}; "
-                f"watcher: {self._program.said}"
+                f"watcher: {self._program.output}"
             ),
         )
         return found[0]
@@ -254,7 +254,7 @@ class Error(NamedTuple):
 
 
 def apart(line: Line, T_map_base: SE2) -> Error:
-    """Compare a pose that was heard with another one."""
+    """Compare a received pose with another one."""
     x, y, yaw = line["pose"]
     metres = math.hypot(x - T_map_base.x, y - T_map_base.y)
     return Error(metres, math.degrees(angle_error(yaw, T_map_base.yaw)))
@@ -299,7 +299,7 @@ class Lab:
         return SE2(*poses[0][1:])
 
     def error_of(self, line: Line) -> Error:
-        """Return how far from the truth a pose is that was heard."""
+        """Return the error of a received pose."""
         return apart(line, self.truth_at(line["stamp"]))
 
     def end(self) -> None:

@@ -1,8 +1,8 @@
-"""A simulated rospy robot, run as a program; a line on its stdin tells it to change.
+"""A simulated rospy robot, run as a program; a line on its stdin is a command.
 
 Such a line is JSON: ``flaws`` (names of `FLAWS`, instead of those before), ``shift`` (x, y, yaw:
 the map moves by that much, the robot does not), ``ask`` (a service without arguments), ``hint``
-(x, y, yaw: a person says where the robot is), ``gone`` (that person), ``go`` (on with the script).
+(x, y, yaw: a person publishes a hint), ``gone`` (that person), ``go`` (on with the script).
 After each, map and fixed transforms are published anew.
 """
 
@@ -91,7 +91,7 @@ class Robot:
         self._publishers = {
             topic: rospy.Publisher(topic, _kind(kind), latch=topic in LATCHED, queue_size=50)
             for topic, kind in TYPES.items()
-            if topic != "initialpose"  # a person comes only when there is something to say
+            if topic != "initialpose"  # advertised only for a hint
         }
 
     def publish(self, topic: str, message: Any) -> None:
@@ -112,26 +112,26 @@ class Robot:
         """Return the map as a message."""
         return occupancy_grid(make, 0.0, "map", self._grid)
 
-    def obey(self, told: dict[str, Any]) -> None:
+    def obey(self, reported: dict[str, Any]) -> None:
         """Change."""
-        self._flaws = told.get("flaws", self._flaws)
-        T_new_old = SE2(*told.get("shift", (0.0, 0.0, 0.0)))
+        self._flaws = reported.get("flaws", self._flaws)
+        T_new_old = SE2(*reported.get("shift", (0.0, 0.0, 0.0)))
         self._grid = replace(self._grid, T_map_grid=T_new_old @ self._grid.T_map_grid)
         self.publish_latched()
-        if "hint" in told:
+        if "hint" in reported:
             self._publishers["initialpose"] = rospy.Publisher(
                 "initialpose", _kind(TYPES["initialpose"]), latch=True, queue_size=1
             )
-            where = SE2(*told["hint"])
-            said = pose_with_covariance(make, 0.0, "map", where, np.diag([0.25, 0.25, 0.07]))
-            self._publishers["initialpose"].publish(said)
-        if "gone" in told:  # the person, whose word would be latched for others that come later
+            where = SE2(*reported["hint"])
+            reported = pose_with_covariance(make, 0.0, "map", where, np.diag([0.25, 0.25, 0.07]))
+            self._publishers["initialpose"].publish(reported)
+        if "gone" in reported:  # the person, whose word would be latched for others that come later
             self._publishers.pop("initialpose").unregister()
-        if "go" in told:
+        if "go" in reported:
             TOLD.set()
-        if "ask" in told:
-            rospy.wait_for_service(told["ask"], timeout=10.0)
-            rospy.ServiceProxy(told["ask"], Empty)()
+        if "ask" in reported:
+            rospy.wait_for_service(reported["ask"], timeout=10.0)
+            rospy.ServiceProxy(reported["ask"], Empty)()
 
     def listen(self) -> None:
         """Obey what comes on stdin."""

@@ -1,4 +1,4 @@
-"""Write what topics of ROS 1 say as lines of JSON: ``ros1_watcher.py FILE TOPIC...``."""
+"""Write messages of ROS 1 topics as lines of JSON: ``ros1_watcher.py FILE TOPIC...``."""
 
 from __future__ import annotations
 

@@ -26,14 +26,14 @@ OURS = (
     *(f"firstfix.ros.ros2.{name}" for name in ("bond", "node", "transport", "types")),
 )
 ALL = ("bond", "nav2_msgs", "kobuki_ros_interfaces", "visualization_msgs")
-# The wheels never turn: whoever changes the pose of the robot carries it.
+# The wheels never turn: a change of the pose means that the robot is carried.
 T_ODOM_BASE = SE2(5.0, 5.0, 1.0)
 # A kernel may have to be compiled first.
 PATIENCE_S = 120.0
 
 
 class Lab:
-    """A fresh rclpy with what is installed beside it; the node is loaded anew over it."""
+    """A fresh rclpy with its other packages; the node is imported again over it."""
 
     def __init__(self, patch: pytest.MonkeyPatch, optional: tuple[str, ...] = ALL) -> None:
         patch.syspath_prepend(str(STAND_IN))
@@ -67,13 +67,17 @@ class Lab:
             durability=kept.TRANSIENT_LOCAL if is_latched else kept.VOLATILE,
         )
 
-    def hears(self, topic: str, type_name: str, **quality: Any) -> list[Any]:
+    def subscribe(self, topic: str, type_name: str, **quality: Any) -> list[Any]:
         """Return a list that grows with what is published."""
-        return self.world.hears(self.types.find("msg", type_name), topic, self.quality(**quality))
+        return self.world.subscribe(
+            self.types.find("msg", type_name), topic, self.quality(**quality)
+        )
 
-    def says(self, topic: str, type_name: str, **quality: Any) -> Any:
+    def advertise(self, topic: str, type_name: str, **quality: Any) -> Any:
         """Return a publisher."""
-        return self.world.says(self.types.find("msg", type_name), topic, self.quality(**quality))
+        return self.world.advertise(
+            self.types.find("msg", type_name), topic, self.quality(**quality)
+        )
 
     def end(self) -> None:
         """Let no thread outlive its test."""
@@ -89,10 +93,10 @@ class Robot:
         self.make = lab.types.make
         self.lidar = Lidar(beams=180, T_base_laser=SE2(0.1, 0.0, 0.0))
         self.stamp = 100.0
-        self.scan = lab.says("scan", "sensor_msgs/LaserScan", is_sensor=True, depth=5)
-        self.tf = lab.says("/tf", "tf2_msgs/TFMessage", depth=100)
-        self.fixed = lab.says("/tf_static", "tf2_msgs/TFMessage", is_latched=True, depth=1)
-        self.map = lab.says("map", "nav_msgs/OccupancyGrid", is_latched=True, depth=1)
+        self.scan = lab.advertise("scan", "sensor_msgs/LaserScan", is_sensor=True, depth=5)
+        self.tf = lab.advertise("/tf", "tf2_msgs/TFMessage", depth=100)
+        self.fixed = lab.advertise("/tf_static", "tf2_msgs/TFMessage", is_latched=True, depth=1)
+        self.map = lab.advertise("map", "nav_msgs/OccupancyGrid", is_latched=True, depth=1)
         T_base_laser = self.lidar.T_base_laser
         self.fixed.publish(transforms(self.make, 0.0, "base_footprint", "laser", T_base_laser))
         self.map.publish(occupancy_grid(self.make, 0.0, "map", grid))
@@ -107,7 +111,7 @@ class Robot:
         self.scan.publish(laser_scan(self.make, "laser", seen))
 
     def look_until(self, is_done: Callable[[], Any]) -> None:
-        """Look again and again, as slowly as the node thinks, until something has happened."""
+        """Send scans, each after the last was processed, until a condition holds."""
         wait_until(lambda: (self.look(), is_done())[1])
 
 

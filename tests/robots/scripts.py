@@ -15,12 +15,12 @@ from firstfix.lab.worlds.catalog import WORLDS, identical_rooms
 Script = Callable[[], tuple[OccupancyGrid, Scenario, int]]
 
 TOLD = threading.Event()
-"""Set when a test tells its robot to go on."""
+"""Set by a test to let its robot continue."""
 
 
 @dataclass(frozen=True, slots=True)
 class StandUntilTold(Phase):
-    """Stand still: what follows shall not begin before the test has seen what it waits for."""
+    """Stand still until the test lets the robot continue."""
 
     def run(self, simulation: Simulation) -> Iterator[Moment]:
         """Stand."""
@@ -45,7 +45,7 @@ def kidnapped() -> tuple[OccupancyGrid, Scenario, int]:
 
 
 def carried() -> tuple[OccupancyGrid, Scenario, int]:
-    """Be carried away when the test says so, with all that a Kobuki notices of that."""
+    """Be carried away on the command of the test, with the signals of a Kobuki."""
     phases = (StandUntilTold(), CarryTo(seconds=3.0), Stand(900.0))
     return WORLDS["office"](), Scenario(phases), 3
 

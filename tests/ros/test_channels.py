@@ -19,16 +19,16 @@ from firstfix.ros.channels import (
 )
 from firstfix.ros.node_config import Mode, NodeConfig
 
-# What no message on a topic tells.
+# Inputs without a topic.
 SERVICES = {Channel.RESET, Channel.UPDATE, Channel.INPUT}
 
 
-def test_everything_is_heard_on_a_topic_or_asked_of_a_service():
+def test_every_input_has_a_topic_or_a_service():
     assert set(subscribed_topics(NodeConfig())) == set(Channel) - SERVICES
 
 
 def test_names_are_those_of_nav2_and_kobuki():
-    names = {heard: topic.name for heard, topic in subscribed_topics(NodeConfig()).items()}
+    names = {received: topic.name for received, topic in subscribed_topics(NodeConfig()).items()}
     assert names == {
         Channel.SCAN: "scan",
         Channel.MAP: "map",

@@ -27,7 +27,7 @@ def test_a_scan_may_be_anything_but_none():
     assert inbox.take(0.0) == [0]
 
 
-def test_who_takes_waits_for_what_comes():
+def test_take_waits_for_a_message():
     inbox: Inbox[int] = Inbox()
     taken: list[int] = []
     worker = threading.Thread(target=lambda: taken.extend(inbox.take(60.0)))
@@ -55,16 +55,16 @@ def test_many_callbacks_at_once_lose_nothing():
     inbox: Inbox[tuple[int, int]] = Inbox()
     taken: list[tuple[int, int]] = []
 
-    def call_back(who: int) -> None:
+    def call_back(caller: int) -> None:
         for i in range(500):
-            inbox.put((who, i))
-            inbox.put_scan((who, -i))
+            inbox.put((caller, i))
+            inbox.put_scan((caller, -i))
 
-    threads = [threading.Thread(target=call_back, args=(who,)) for who in range(4)]
+    threads = [threading.Thread(target=call_back, args=(caller,)) for caller in range(4)]
     for thread in threads:
         thread.start()
     while any(thread.is_alive() for thread in threads):
         taken += inbox.take(0.01)
     taken += inbox.take(0.0)
-    for who in range(4):
-        assert [i for at, i in taken if at == who and i > 0] == list(range(1, 500))
+    for caller in range(4):
+        assert [i for at, i in taken if at == caller and i > 0] == list(range(1, 500))

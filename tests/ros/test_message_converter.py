@@ -54,7 +54,7 @@ def robot(wire, hall_plan):
 
 @pytest.fixture
 def known(ear, robot):
-    """An ear that has heard where the laser sits, and odometry up to 100 s."""
+    """A converter that has the pose of the laser, and odometry up to 100 s."""
     ear.take(Channel.TF_STATIC, robot.fixed())
     ear.take(Channel.TF, robot.tf())
     return ear
@@ -69,21 +69,21 @@ def kinds(inputs):
 
 def test_transforms_are_odometry(ear, robot):
     assert ear.take(Channel.TF_STATIC, robot.fixed()) == []
-    (told,) = ear.take(Channel.TF, robot.tf())
-    assert told == Odometry(100.0, told.T_odom_base)
-    assert told.T_odom_base.distance_to(robot.T_odom_base) < 1e-9
+    (reported,) = ear.take(Channel.TF, robot.tf())
+    assert reported == Odometry(100.0, reported.T_odom_base)
+    assert reported.T_odom_base.distance_to(robot.T_odom_base) < 1e-9
     assert ear.take(Channel.TF, robot.tf()) == []
 
 
-def test_odometry_comes_by_its_topic_where_no_transform_tells(ear, robot):
+def test_odometry_comes_from_its_topic_without_a_transform(ear, robot):
     message = robot.wire.sent(
         odometry(robot.wire.make, 5.0, "odom", "base_footprint", SE2(1.0, 2.0, 0.5))
     )
-    (told,) = ear.take(Channel.ODOM, message)
-    assert (told.stamp, told.T_odom_base.x) == (5.0, 1.0)
+    (reported,) = ear.take(Channel.ODOM, message)
+    assert (reported.stamp, reported.T_odom_base.x) == (5.0, 1.0)
 
 
-def test_a_scan_knows_its_place_on_the_robot(known, robot):
+def test_a_scan_has_the_pose_of_its_sensor_on_the_robot(known, robot):
     message = robot.scan()
     (scan,) = known.take(Channel.SCAN, message)
     assert isinstance(scan, LaserScan)
@@ -194,7 +194,7 @@ def test_a_scan_waits_for_the_place_of_a_moving_laser(ear, turret):
     assert ear.complaints == []
 
 
-def test_of_scans_that_become_known_at_once_the_newest_wins(ear, turret):
+def test_of_scans_that_become_usable_together_the_newest_wins(ear, turret):
     ear.take(Channel.TF, turret.mast(99.9))
     ear.take(Channel.TF, turret.tf())
     for _ in range(3):
@@ -206,7 +206,7 @@ def test_of_scans_that_become_known_at_once_the_newest_wins(ear, turret):
     assert ear.take(Channel.TF, turret.mast(turret.stamp + 1.0)) == []
 
 
-def test_scans_that_wait_for_ever_are_told_of_and_do_not_pile_up(ear, turret):
+def test_scans_that_wait_for_ever_are_reported_and_do_not_accumulate(ear, turret):
     ear.take(Channel.TF, turret.mast(50.0))
     ear.take(Channel.TF, turret.tf())
     for _ in range(100):
@@ -233,10 +233,10 @@ def test_a_waiting_scan_that_cannot_be_used_costs_no_odometry(ear, turret):
 
 def test_a_clock_set_back_is_a_reset_then_odometry(known, robot):
     robot.stamp = 20.0
-    reset, told = known.take(Channel.TF, robot.tf())
+    reset, reported = known.take(Channel.TF, robot.tf())
     assert reset == Reset(20.0)
-    assert isinstance(told, Odometry)
-    assert told.stamp == 20.0
+    assert isinstance(reported, Odometry)
+    assert reported.stamp == 20.0
     assert known.complaints == [("clock", "time went back by 80.0 s: starting over")]
     assert kinds(known.take(Channel.SCAN, robot.scan())) == [LaserScan]
 
@@ -249,9 +249,9 @@ def test_a_clock_set_back_by_less_than_a_second_costs_one_scan_and_mixes_nothing
     assert known.take(Channel.SCAN, robot.scan()) == []
     assert "1 scans dropped so far; the clock was set back: scans by 0.60 s" in known.last
     robot.stamp = 99.42
-    (told,) = known.take(Channel.TF, robot.tf())
-    assert told.stamp == 99.42
-    assert told.T_odom_base.distance_to(robot.T_odom_base) < 1e-9
+    (reported,) = known.take(Channel.TF, robot.tf())
+    assert reported.stamp == 99.42
+    assert reported.T_odom_base.distance_to(robot.T_odom_base) < 1e-9
     assert kinds(known.take(Channel.SCAN, robot.scan())) == [LaserScan]
 
 
@@ -306,7 +306,7 @@ def test_a_map_that_could_not_be_searched_is_not_the_one_in_use(ear, robot):
     assert kinds(first.take(Channel.MAP, robot.map())) == [NewMap]
 
 
-def test_a_map_in_another_frame_is_used_and_told_of(ear, robot):
+def test_a_map_in_another_frame_is_used_and_reported(ear, robot):
     assert kinds(ear.take(Channel.MAP, robot.map("world"))) == [NewMap]
     assert ear.complaints == [("map frame", "the map is in 'world', not in 'map': used as it is")]
 
@@ -327,7 +327,7 @@ def hint(robot, frame="map", stamp=5.0):
     return robot.wire.sent(pose_with_covariance(make, stamp, frame, T, np.eye(3)))
 
 
-def test_a_hint_is_where_a_person_says(ear, robot):
+def test_a_hint_has_the_pose_of_initialpose(ear, robot):
     (given,) = ear.take(Channel.INITIAL_POSE, hint(robot))
     assert (given.stamp, given.source) == (5.0, "a person")
     assert given.T_map_base.distance_to(SE2(1.0, 2.0, 0.5)) < 1e-12
@@ -374,22 +374,22 @@ def test_what_needs_no_conversion_is_passed_on(ear, hall_plan):
 
 
 @pytest.mark.parametrize(
-    ("heard", "name", "field", "kind"),
+    ("received", "name", "field", "kind"),
     [
         (Channel.CLIFF, "CliffEvent", "sensor", SignalKind.CLIFF),
         (Channel.WHEEL_DROP, "WheelDropEvent", "wheel", SignalKind.WHEEL_DROP),
         (Channel.BUMPER, "BumperEvent", "bumper", SignalKind.BUMPER),
     ],
 )
-def test_events_of_a_kobuki_are_signals(known, wire, heard, name, field, kind):
+def test_events_of_a_kobuki_are_signals(known, wire, received, name, field, kind):
     def event(state):
-        more = {"bottom": 0} if heard is Channel.CLIFF else {}
+        more = {"bottom": 0} if received is Channel.CLIFF else {}
         return wire.sent(wire.make(f"kobuki/{name}", **{field: 1, "state": state}, **more))
 
-    assert known.take(heard, event(0)) == []
-    assert known.take(heard, event(1)) == [Signal(100.0, kind, active=True)]
-    assert known.take(heard, event(0)) == [Signal(100.0, kind, active=False)]
-    assert known.take(heard, event(0)) == []
+    assert known.take(received, event(0)) == []
+    assert known.take(received, event(1)) == [Signal(100.0, kind, active=True)]
+    assert known.take(received, event(0)) == [Signal(100.0, kind, active=False)]
+    assert known.take(received, event(0)) == []
 
 
 def test_a_robot_stands_again_when_both_wheels_do(known):
@@ -400,8 +400,8 @@ def test_a_robot_stands_again_when_both_wheels_do(known):
     assert [wheel(0, 1), wheel(1, 1), wheel(0, 0), wheel(1, 0)] == [True, True, True, False]
 
 
-def test_who_asks_to_search_anew_says_that_the_robot_stands(known):
-    """A base that was restarted in the air does not tell of its landing."""
+def test_a_requested_search_ends_the_lifted_state(known):
+    """A base that was restarted in the air does not report that it was set down."""
     known.take(Channel.WHEEL_DROP, Message(wheel=0, state=1))
     known.take(Channel.RESET, None)
     known.take(Channel.WHEEL_DROP, Message(wheel=1, state=1))
@@ -416,7 +416,7 @@ def test_kinds_of_events_do_not_mix(known):
     assert (signal.kind, signal.active) == (SignalKind.CLIFF, False)
 
 
-def test_anybody_may_say_that_the_robot_was_picked_up(known, wire):
+def test_picked_up_is_a_signal_on_its_topic(known, wire):
     message = wire.sent(wire.make("std_msgs/Bool", data=True))
     assert known.take(Channel.KIDNAPPED, message) == [
         Signal(100.0, SignalKind.PICKED_UP, active=True)

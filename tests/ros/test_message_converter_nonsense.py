@@ -91,8 +91,8 @@ class Pair:
         self._converter = MessageConverter(NodeConfig(), ExactStamps(), lambda subject, text: None)
         self.localizer = Localizer(cache_dir=cache)
 
-    def take(self, heard, message):
-        for given_ in self._converter.convert(heard, message):
+    def take(self, received, message):
+        for given_ in self._converter.convert(received, message):
             self.localizer.handle(given_)
 
 
@@ -104,16 +104,16 @@ def cache(tmp_path_factory):
 @pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
 @given(st.lists(HEARD, max_size=12), st.lists(HEARD, max_size=12))
-def test_whatever_is_heard_only_errors_of_ours_come_of_it(ros2, hall_plan, cache, before, after):
+def test_any_message_is_converted_or_raises_an_error_of_ours(ros2, hall_plan, cache, before, after):
     robot = Speaker(ros2, hall_plan, THERE)
     pair = Pair(cache)
     for messages in (before, after):
-        for heard, message in messages:
+        for received, message in messages:
             with contextlib.suppress(InputError):
-                pair.take(heard, message)
-        for heard, message in ((Channel.MAP, robot.map()), (Channel.TF_STATIC, robot.fixed())):
+                pair.take(received, message)
+        for received, message in ((Channel.MAP, robot.map()), (Channel.TF_STATIC, robot.fixed())):
             with contextlib.suppress(InputError):
-                pair.take(heard, message)
+                pair.take(received, message)
         robot.move()
         with contextlib.suppress(InputError):
             robot.report(pair.take)
@@ -130,12 +130,12 @@ def test_after_any_nonsense_a_robot_that_reports_well_is_found(ros2, hall_plan, 
     pair.take(Channel.TF_STATIC, robot.fixed())
     robot.report(pair.take)
     assert pair.localizer.state is State.LOCALIZED
-    for heard, message in messages:
+    for received, message in messages:
         with contextlib.suppress(InputError):
-            pair.take(heard, message)
-    for heard in (Channel.CLIFF, Channel.WHEEL_DROP, Channel.BUMPER, Channel.KIDNAPPED):
+            pair.take(received, message)
+    for received in (Channel.CLIFF, Channel.WHEEL_DROP, Channel.BUMPER, Channel.KIDNAPPED):
         for which in range(4):
-            pair.take(heard, Message(wheel=which, state=0))
+            pair.take(received, Message(wheel=which, state=0))
     for _ in range(30):
         robot.move()
         robot.report(pair.take)

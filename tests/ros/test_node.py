@@ -28,7 +28,7 @@ THERE = SE2(4.0, 3.0, 1.0)
 
 
 class Running:
-    """A node, its recorder, and all that its localizer was told and said."""
+    """A node, its recorder, and the inputs and outputs of its localizer."""
 
     def __init__(self, recorder, **settings):
         self.recorder = recorder
@@ -83,11 +83,11 @@ def test_a_robot_is_found_from_its_first_scan(run, robot, recorder):
     running = run()
     introduce(running, robot)
     (message,) = wait_for(lambda: recorder.on(INITIAL_POSE))
-    said = to_pose(message)
-    assert to_planar(said).distance_to(THERE) < 0.1
-    assert said.stamp == robot.stamp
+    reported = to_pose(message)
+    assert to_planar(reported).distance_to(THERE) < 0.1
+    assert reported.stamp == robot.stamp
     wait_for(lambda: running.state is State.LOCALIZED)
-    assert recorder.told(Severity.WARNING) == recorder.told(Severity.ERROR) == []
+    assert recorder.logged(Severity.WARNING) == recorder.logged(Severity.ERROR) == []
 
 
 def test_the_same_in_messages_of_ros_1(run, wire, hall_plan):
@@ -141,7 +141,7 @@ def test_a_clock_set_back_is_survived(run, robot, recorder):
     robot.stamp = 5.0
     robot.report(running.receive)
     wait_for(lambda: [m for m in recorder.on(AMCL_POSE) if to_pose(m).stamp == 5.0])
-    assert recorder.told(Severity.WARNING) == ["time went back by 95.0 s: starting over"]
+    assert recorder.logged(Severity.WARNING) == ["time went back by 95.0 s: starting over"]
 
 
 # ---- threads
@@ -181,7 +181,7 @@ def test_callbacks_of_many_threads_are_served_by_one(run, robot, recorder):
         thread.join()
     wait_for(lambda: sum(not isinstance(g, LaserScan) for g, _ in running.handled) >= 202)
     assert recorder.threads == {"firstfix"}
-    assert recorder.told(Severity.ERROR) == []
+    assert recorder.logged(Severity.ERROR) == []
 
 
 def test_it_can_be_stopped_before_between_and_after(run):
@@ -211,11 +211,11 @@ def test_the_end_does_not_wait_for_ever(run, robot, recorder, monkeypatch):
     monkeypatch.setattr(node_module, "_STOP_S", 0.05)
     begun, go_on = threading.Event(), threading.Event()
 
-    def think(given, outputs, localizer):
+    def observe(given, outputs, localizer):
         begun.set()
         go_on.wait(60.0)
 
-    node = Node(NodeConfig(), recorder, [think])
+    node = Node(NodeConfig(), recorder, [observe])
     node.start()
     node.receive(Channel.MAP, robot.map())
     assert begun.wait(60.0)
@@ -238,7 +238,7 @@ class Broken(Recorder):
         super().publish(topic, message)
 
 
-def test_an_error_of_its_own_ends_nothing_and_is_told_once(run, robot, ros2, monkeypatch):
+def test_an_internal_error_does_not_end_the_node_and_is_logged_once(run, robot, ros2, monkeypatch):
     monkeypatch.setattr(node_module, "_REPEAT_S", 1000.0)
     recorder = Broken(ros2)
     running = run(recorder, mode=Mode.FULL)
@@ -248,7 +248,7 @@ def test_an_error_of_its_own_ends_nothing_and_is_told_once(run, robot, ros2, mon
         robot.report(running.receive)
         wait_for(lambda: [m for m in recorder.on(AMCL_POSE) if to_pose(m).stamp == robot.stamp])
         running.receive(Channel.RESET)
-    (error,) = recorder.told(Severity.ERROR)
+    (error,) = recorder.logged(Severity.ERROR)
     assert error.startswith("an error of firstfix itself:\nTraceback")
     assert "the wire is cut" in error
 
@@ -269,9 +269,9 @@ def test_a_localizer_that_fails_is_replaced_and_searches_the_same_map(
     monkeypatch.setattr(Localizer, "handle", fail_once)
     running.receive(Channel.UPDATE)
     wait_for(lambda: running.state is State.SEARCHING)
-    wait_for(lambda: len(recorder.told(Severity.ERROR)) == 2)
-    said, traceback = recorder.told(Severity.ERROR)
-    assert said == "the localizer failed and was reset: searching the whole map again"
+    wait_for(lambda: len(recorder.logged(Severity.ERROR)) == 2)
+    reported, traceback = recorder.logged(Severity.ERROR)
+    assert reported == "the localizer failed and was reset: searching the whole map again"
     assert "by chance" in traceback
     robot.move()
     robot.report(running.receive)
@@ -298,32 +298,32 @@ def test_a_localizer_that_fails_on_a_new_map_keeps_the_old_one(run, robot, ros2,
     wait_for(lambda: running.state is State.LOCALIZED)
 
 
-def test_nonsense_is_told_in_one_sentence_and_ends_nothing(run, robot, recorder):
+def test_invalid_messages_are_logged_in_one_sentence_and_do_not_end_the_node(run, robot, recorder):
     running = run(mode=Mode.FULL)
     introduce(running, robot)
     bad = robot.scan()
     bad.range_max = 0.0
     running.receive(Channel.SCAN, bad)
-    warning = wait_for(lambda: recorder.told(Severity.WARNING))[0]
+    warning = wait_for(lambda: recorder.logged(Severity.WARNING))[0]
     assert warning.startswith("expected a range_max above range_min, received")
     robot.report(running.receive)
     wait_for(lambda: running.state is State.LOCALIZED)
 
 
-def test_each_subject_is_told_once_in_a_while(run, robot, recorder, monkeypatch):
+def test_each_warning_is_rate_limited(run, robot, recorder, monkeypatch):
     monkeypatch.setattr(node_module, "_REPEAT_S", 1000.0)
     running = run()
     running.receive(Channel.MAP, robot.map())
     for i in range(20):
         robot.move()
         running.receive(Channel.TF, robot.tf())
-        running.receive(Channel.SCAN, robot.scan("lidar"))  # nobody knows where that is
+        running.receive(Channel.SCAN, robot.scan("lidar"))  # a frame without a transform
         bad = robot.map()
         bad.info.width = i  # each time another sentence
         running.receive(Channel.MAP, bad)
         running.receive(Channel.UPDATE)
         wait_for(lambda n=i + 1: len(running.given(Odometry)) == n)
-    about_maps, about_scans = sorted(recorder.told(Severity.WARNING), reverse=True)
+    about_maps, about_scans = sorted(recorder.logged(Severity.WARNING), reverse=True)
     assert about_maps.startswith("expected 0 x 160 cells")
     assert about_scans.startswith("1 scans dropped so far; the pose of the laser is unknown")
 
@@ -333,7 +333,7 @@ def test_warnings_come_again_when_their_time_is_over(run, recorder, monkeypatch)
     running = run()
     for _ in range(3):
         running.receive(Channel.CLIFF, SimpleNamespace(data="no event"))
-    wait_for(lambda: len(recorder.told(Severity.WARNING)) == 3)
+    wait_for(lambda: len(recorder.logged(Severity.WARNING)) == 3)
 
 
 def test_silent_topics_are_named_although_others_speak(run, robot, recorder, monkeypatch):
@@ -343,16 +343,16 @@ def test_silent_topics_are_named_although_others_speak(run, robot, recorder, mon
     def speak():
         robot.move(seconds=0.01)
         running.receive(Channel.TF, robot.tf())
-        return len(recorder.told(Severity.WARNING)) >= 2
+        return len(recorder.logged(Severity.WARNING)) >= 2
 
     wait_for(speak)
-    assert sorted(recorder.told(Severity.WARNING)) == [
+    assert sorted(recorder.logged(Severity.WARNING)) == [
         "no message on map (nav_msgs/OccupancyGrid) for 0 s",
         "no message on scan (sensor_msgs/LaserScan) for 0 s",
     ]
 
 
-def test_scans_that_need_no_conversion_are_heard_too(run, robot, recorder, monkeypatch, hall_plan):
+def test_scans_that_need_no_conversion_are_used_too(run, robot, recorder, monkeypatch, hall_plan):
     monkeypatch.setattr(node_module, "_SILENCE_S", 0.2)
     running = run(mode=Mode.FULL)
     running.node.give(NewMap(0.0, hall_plan))
@@ -361,7 +361,7 @@ def test_scans_that_need_no_conversion_are_heard_too(run, robot, recorder, monke
         running.node.give(LaserScan(np.ones(9, np.float32), 0.0, 0.1, 0.1, 5.0, stamp=1.0))
         running.wait_until_handled(LaserScan)
     assert len(running.given(NewMap)) == 1
-    assert not any("scan" in text for text in recorder.told(Severity.WARNING))
+    assert not any("scan" in text for text in recorder.logged(Severity.WARNING))
 
 
 # ---- maps
@@ -409,7 +409,7 @@ def test_a_map_that_cannot_be_searched_leaves_the_one_in_use(run, robot, recorde
     running.wait_until_handled(LaserScan, 2)
     assert len(running.given(NewMap)) == 1
     assert running.state is State.LOCALIZED
-    assert "a map with walls and free space" in recorder.told(Severity.WARNING)[0]
+    assert "a map with walls and free space" in recorder.logged(Severity.WARNING)[0]
 
 
 def test_settings_out_of_their_range_make_no_node():
@@ -422,7 +422,7 @@ def test_when_scans_stop_the_status_becomes_stale_once(run, robot, recorder):
     introduce(running, robot)
     wait_for(lambda: [m for m in recorder.on(STATUS) if m.status[0].level == 3])
     wait_for(lambda: running.state is State.LOCALIZED)
-    (warning,) = recorder.told(Severity.WARNING)
+    (warning,) = recorder.logged(Severity.WARNING)
     assert warning.startswith("STALE: no scan for ")
     robot.move()
     robot.report(running.receive)

@@ -1,4 +1,4 @@
-"""Who is told what, and how often: by what arrives."""
+"""Which outputs are published on which topics, and how often."""
 
 import math
 
@@ -76,15 +76,15 @@ def status_values(message):
     return {pair.key: pair.value for pair in message.status[0].values}
 
 
-# ---- who follows the robot
+# ---- poses while tracking
 
 
 def test_bootstrap_hands_over_one_pose_and_nothing_else(recorder):
     announced(recorder, BOOTSTRAP, found(10.0), tracked(10.1), tracked(10.2), particles=cloud())
     (message,) = recorder.on(INITIAL_POSE)
-    said = to_pose(message)
-    assert (said.parent, said.stamp) == ("map", 10.0)
-    assert to_planar(said).distance_to(HERE) < 1e-12
+    reported = to_pose(message)
+    assert (reported.parent, reported.stamp) == ("map", 10.0)
+    assert to_planar(reported).distance_to(HERE) < 1e-12
     covariance = np.reshape(message.pose.covariance, (6, 6))
     assert [covariance[i, i] for i in (0, 1, 5)] == [0.01, 0.04, 0.09]
     assert {topic for topic, _ in recorder.published} == {INITIAL_POSE, LOCALIZED, STATUS}
@@ -105,7 +105,7 @@ def test_transforms_hold_until_the_next_one(recorder):
     assert to_seconds(message.transforms[0].header.stamp) == 10.25
 
 
-def test_somebody_else_may_broadcast_the_transform(recorder):
+def test_another_node_may_broadcast_the_transform(recorder):
     announced(recorder, NodeConfig(mode=Mode.FULL, tf_broadcast=False), found())
     assert recorder.on(TF) == []
     assert len(recorder.on(AMCL_POSE)) == 1
@@ -126,11 +126,11 @@ def test_nothing_is_published_that_was_not_advertised(ros2, config, particles):
     recorder = Recorder(ros2, particles)
     recorder.listening = {topic.name: 1 for topic in (particles, INITIAL_POSE, MARKERS)}
     announced(recorder, config, searching(1.0), several(2.0), found(3.0), particles=cloud())
-    said = set(published_topics(config, particles))
-    assert {topic for topic, _ in recorder.published} == said
+    reported = set(published_topics(config, particles))
+    assert {topic for topic, _ in recorder.published} == reported
 
 
-# ---- the AMCL beside
+# ---- another AMCL
 
 
 def test_an_amcl_that_comes_late_gets_the_pose_of_now(recorder):
@@ -155,7 +155,7 @@ def test_found_elsewhere_is_handed_over_anew(recorder):
     assert len(recorder.on(INITIAL_POSE)) == 2
 
 
-def test_own_poses_are_told_from_those_of_people(recorder, ros2):
+def test_own_poses_are_distinguished_from_those_of_people(recorder, ros2):
     publisher = announced(recorder, BOOTSTRAP, *(found(float(stamp)) for stamp in range(10, 15)))
     assert all(publisher.is_own(message) for message in recorder.on(INITIAL_POSE))
     for stamp, T in ((10.0, SE2(1.0, 2.0, 0.6)), (10.5, HERE)):
@@ -175,7 +175,7 @@ def stamps_of(messages):
     return [to_seconds(message.header.stamp) for message in messages]
 
 
-def test_a_cloud_is_published_at_its_rate_and_only_where_it_is_heard(recorder):
+def test_a_cloud_is_published_at_its_rate_and_only_to_subscribers(recorder):
     publisher = OutputPublisher(NodeConfig(mode=Mode.FULL, cloud_rate=2.0), ExactStamps(), recorder)
     for i in range(10):
         recorder.listening[PARTICLES.name] = int(i >= 2)
@@ -191,7 +191,7 @@ def test_a_rate_of_zero_is_none(recorder):
     assert recorder.on(PARTICLES) == []
 
 
-def test_a_cloud_is_what_the_transport_knows(wire):
+def test_a_cloud_has_the_type_of_the_transport(wire):
     for topic in (PARTICLES, PARTICLE_POSES):
         recorder = Recorder(wire, topic)
         recorder.listening[topic.name] = 1
@@ -210,7 +210,7 @@ def test_without_a_belief_there_is_no_cloud(recorder):
 # ---- places that are left open
 
 
-def test_places_are_told_and_taken_back_when_the_robot_is_found(recorder):
+def test_places_are_published_and_cleared_when_the_robot_is_found(recorder):
     announced(recorder, BOOTSTRAP, several(10.0, 3), several(11.0, 2), found(12.0), tracked(13.0))
     assert [len(message.poses) for message in recorder.on(HYPOTHESES)] == [3, 2, 0]
     assert [p.position.x for p in recorder.on(HYPOTHESES)[0].poses] == [0.0, 8.0, 16.0]
@@ -234,7 +234,7 @@ def test_the_motion_that_would_decide_is_in_the_status_of_its_places(recorder):
 # ---- status and log
 
 
-def test_a_status_says_state_reason_and_evidence(recorder):
+def test_a_status_has_state_reason_and_evidence(recorder):
     announced(recorder, FULL, found())
     (message,) = recorder.on(STATUS)
     (status,) = message.status
@@ -277,7 +277,7 @@ def test_status_comes_at_its_rate_and_at_every_change(recorder):
     assert stamps_of(recorder.on(STATUS))[-1] == 3.0
 
 
-def test_the_log_tells_of_changes_and_once_in_a_while_why_nothing_is_found(recorder):
+def test_the_log_has_changes_and_at_a_low_rate_why_nothing_is_found(recorder):
     publisher = OutputPublisher(FULL, ExactStamps(), recorder)
     publisher.publish(searching(0.0, "a map came"), None)
     for i in range(1, 25):
@@ -285,7 +285,7 @@ def test_the_log_tells_of_changes_and_once_in_a_while_why_nothing_is_found(recor
     publisher.publish(found(1030.0), None)
     for i in range(100):
         publisher.publish(tracked(1031.0 + i), None)
-    assert recorder.told(Severity.INFO) == [
+    assert recorder.logged(Severity.INFO) == [
         "SEARCHING: a map came",
         "SEARCHING: only 1% fit",
         "SEARCHING: only 11% fit",
@@ -358,6 +358,6 @@ def test_markers_show_each_place_with_its_probability(recorder):
     assert [marker.action for marker in recorder.on(MARKERS)[-1].markers] == [3]
 
 
-def test_no_markers_are_made_while_nobody_subscribes(recorder):
+def test_no_markers_are_made_without_subscribers(recorder):
     announced(recorder, FULL, several(1.0, 4))
     assert recorder.on(MARKERS) == []

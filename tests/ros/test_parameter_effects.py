@@ -37,7 +37,7 @@ START = {
 }
 
 # Of each parameter: a value other than the default, and the parameters that it depends on. The
-# robot drives in a hall; where "in" says so, it gets lost there, or
+# robot drives in a hall; with "in", it gets lost there, or
 # it is in one of four equal rooms.
 EFFECTS: dict[str, dict[str, Any]] = {
     "mode": {"to": "bootstrap"},

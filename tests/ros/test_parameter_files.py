@@ -157,7 +157,7 @@ def test_ignored_parameters_may_have_any_value(load, name):
 
 
 @pytest.mark.parametrize(
-    ("line", "says"),
+    ("line", "message"),
     [
         ("alpa1: 0.2", "received 'alpa1'; the nearest is alpha1"),
         ("max_beam: 30", "the nearest is max_beams"),
@@ -202,8 +202,8 @@ def test_ignored_parameters_may_have_any_value(load, name):
         ),
     ],
 )
-def test_invalid_lines_are_rejected_with_a_remedy(load, line, says):
-    with pytest.raises(InputError, match=says) as caught:
+def test_invalid_lines_are_rejected_with_a_remedy(load, line, message):
+    with pytest.raises(InputError, match=message) as caught:
         load(f"amcl:\n  ros__parameters:\n    use_sim_time: true\n    {line}\n")
     assert "nav2_params.yaml" in str(caught.value)
     assert "\n" not in str(caught.value)

@@ -45,7 +45,7 @@ def test_defaults_make_default_settings():
     assert configured({p.name: p.default for p in parameters()}) == NodeConfig()
 
 
-def test_every_parameter_says_type_meaning_and_range():
+def test_every_parameter_has_type_meaning_and_range():
     for parameter in parameters():
         assert type(parameter.default) in (bool, int, float, str)
         assert parameter.description
@@ -188,7 +188,7 @@ def test_a_name_that_is_nearly_right_comes_with_the_right_one():
         ("initial_pose", 1.0, "initial_pose"),
     ],
 )
-def test_what_does_not_fit_is_told_with_the_remedy(name, value, words):
+def test_invalid_values_are_reported_with_the_remedy(name, value, words):
     with pytest.raises(InputError, match=words):
         configured({name: value})
 

@@ -38,7 +38,7 @@ def test_poses_are_written_at_the_rate(file):
 
 
 @pytest.mark.parametrize("rate_hz", [0.0, -1.0])
-def test_without_a_rate_a_pose_is_written_where_it_is_told_to(file, rate_hz):
+def test_without_a_rate_a_pose_is_written_on_request(file, rate_hz):
     assert offered(file, rate_hz, [0.0, 1e3, 1e6]) == []
     PoseKeeper(file, rate_hz).save(pose_at(5.0))
     assert load_pose(file).stamp == 5.0
@@ -113,7 +113,7 @@ assert list(disk.iterdir()) == []
 """
 
 
-def test_a_disk_that_became_read_only_keeps_the_pose_and_says_so(on_small_disk):
+def test_a_disk_that_became_read_only_keeps_the_pose_and_is_reported(on_small_disk):
     on_small_disk(READ_ONLY)
 
 

@@ -103,9 +103,7 @@ def test_a_pose_that_does_not_hold_any_more_is_not_kept(memory_of, hall_plan, fi
     assert not file.exists()
 
 
-def test_what_an_earlier_run_has_saved_stays_until_this_one_knows_better(
-    memory_of, hall_plan, file
-):
+def test_the_pose_of_an_earlier_run_stays_until_this_one_has_another(memory_of, hall_plan, file):
     save_pose(file, saved(hall_plan))
     memory = memory_of()
     memory.hint_after(NewMap(0.0, hall_plan))
@@ -143,7 +141,7 @@ def test_a_slow_disk_holds_nothing_up(memory_of, hall_plan, monkeypatch):
     assert written == [11.0, 109.0]  # none of those between has queued up
 
 
-def test_a_disk_that_cannot_be_written_is_told_of_once(memory_of, hall_plan, tmp_path, lines):
+def test_a_disk_that_cannot_be_written_is_reported_once(memory_of, hall_plan, tmp_path, lines):
     memory = memory_of(path=tmp_path / "no" / "folder.json", save_pose_rate=1.0)
     memory.hint_after(NewMap(0.0, hall_plan))
     lines.clear()
@@ -156,7 +154,7 @@ def test_a_disk_that_cannot_be_written_is_told_of_once(memory_of, hall_plan, tmp
     assert text.startswith("the pose is not saved: expected access to")
 
 
-def test_a_disk_that_fails_again_after_it_worked_is_told_of_again(
+def test_a_disk_that_fails_again_after_it_worked_is_reported_again(
     memory_of, hall_plan, tmp_path, lines
 ):
     folder = tmp_path / "stick"
@@ -215,7 +213,7 @@ def test_a_saved_pose_of_another_map_or_time_is_none(memory_of, hall_plan, file,
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"\x00" * 500, b"[]", b"x" * 100_000])
-def test_a_broken_file_is_told_in_one_line_and_left_alone(
+def test_a_broken_file_is_reported_in_one_line_and_left_unchanged(
     memory_of, hall_plan, file, lines, content
 ):
     file.write_bytes(content)
@@ -276,7 +274,7 @@ def test_the_word_of_a_person_comes_before_all(memory_of, hall_plan, file):
 
 
 class Life:
-    """A node between start and stop, and the robot that it hears."""
+    """A started node and its robot."""
 
     def __init__(self, wire, robot, file, **parameters):
         self.recorder = Recorder(wire)
@@ -313,8 +311,8 @@ class Life:
         self._robot.report(self._node.receive)
         assert self._looked.wait(60.0)
 
-    def receive(self, heard, message=None):
-        self._node.receive(heard, message)
+    def receive(self, received, message=None):
+        self._node.receive(received, message)
 
     @property
     def reason(self):
@@ -328,10 +326,10 @@ class Life:
 IN_ROOM_1 = SE2(8.0 + 4.7, 3.6, -2.4)
 
 
-def test_in_a_building_of_equal_rooms_a_restarted_node_knows_its_room(ros2, file):
+def test_in_a_building_of_equal_rooms_a_restarted_node_finds_its_room(ros2, file):
     robot = Speaker(ros2, identical_rooms(3), IN_ROOM_1)
     with Life(ros2, robot, file) as first:
-        assert first.state is State.DISAMBIGUATING  # nobody could know
+        assert first.state is State.DISAMBIGUATING  # no scan can decide
         person = pose_with_covariance(ros2.make, 0.0, "map", IN_ROOM_1, np.eye(3))
         first.receive(Channel.INITIAL_POSE, person)
         first.look()
@@ -341,7 +339,9 @@ def test_in_a_building_of_equal_rooms_a_restarted_node_knows_its_room(ros2, file
         assert second.state is State.LOCALIZED
         assert second.pose.distance_to(IN_ROOM_1) < 0.1
         assert second.reason.startswith("LOCALIZED: chosen by the saved pose; ")
-        (line,) = [x for x in second.recorder.told(Severity.INFO) if x.startswith("the saved pose")]
+        (line,) = [
+            x for x in second.recorder.logged(Severity.INFO) if x.startswith("the saved pose")
+        ]
         assert "moved along with odometry" in line
 
 
@@ -387,5 +387,5 @@ def test_a_node_goes_on_where_nothing_can_be_saved(ros2, hall_plan, tmp_path):
         for _ in range(6):
             life.look()
         assert life.state is State.LOCALIZED
-    (warning,) = life.recorder.told(Severity.WARNING)
+    (warning,) = life.recorder.logged(Severity.WARNING)
     assert warning.startswith("the pose is not saved")

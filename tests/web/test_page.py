@@ -100,7 +100,7 @@ def turned(chromium: Any, request: pytest.FixtureRequest, tmp_path: Path) -> Ite
 
 # The last is wider than a picture may be: some cells share a pixel, and an odd one is left.
 @pytest.mark.parametrize("turned", [(0.0, 0), (0.6, 0), (-2.0, 0), (0.3, 4321)], indirect=True)
-def test_a_turned_map_lies_where_its_origin_says(turned: Turned, visit: Visitor) -> None:
+def test_a_turned_map_lies_at_its_origin(turned: Turned, visit: Visitor) -> None:
     grid, server = turned
     page = visit(server.url, color_scheme="light")
     page.wait_for_map()

@@ -60,10 +60,10 @@ def localize_three_times(url: str) -> None:
 def test_a_robot_of_ros_1(ros1: Any, office: str):
     ros1.robot("stand")
     node = ros1.start(*command(office, "ros1", "_mode:=full"))
-    localize_three_times(url_in(lambda: node.said))
+    localize_three_times(url_in(lambda: node.output))
     node.end()
     assert node.wait() == 0
-    assert "Traceback" not in node.said
+    assert "Traceback" not in node.output
 
 
 def test_a_robot_of_dds(dds: Any, office: str):

@@ -34,7 +34,7 @@ def test_what_is_no_domain_is_refused(text):
         domain_settings({"ROS_DOMAIN_ID": text})
 
 
-def test_names_of_types_count_whatever_others_say_about_the_types():
+def test_endpoints_match_by_the_name_of_their_type_alone():
     ignored = configuration().findtext("*/Compatibility/IgnoreTypeInformation")
     assert ignored is not None
     assert "1.15" in ignored.split(",")
@@ -74,7 +74,7 @@ def test_static_peers_are_looked_for_besides():
     assert configuration(ROS_STATIC_PEERS="a").find("*/General") is None
 
 
-def test_off_means_to_be_found_by_nobody():
+def test_discovery_range_off_finds_no_one():
     root = configuration(ROS_AUTOMATIC_DISCOVERY_RANGE="OFF", ROS_STATIC_PEERS="a")
     assert root.findtext("*/General/AllowMulticast") == "false"
     assert root.find("*/Discovery/Tag") is not None
@@ -91,7 +91,7 @@ def test_the_users_own_configuration_has_the_last_word():
     assert text.endswith("</CycloneDDS>,file:///etc/mine.xml")
 
 
-def test_what_cyclone_dds_cannot_be_told_is_refused():
+def test_settings_that_cyclone_dds_lacks_are_rejected():
     with pytest.raises(InputError, match="ASCII"):
         domain_settings({"CYCLONEDDS_URI": "file:///home/zoë/mine.xml"})
 

@@ -37,7 +37,7 @@ def test_what_is_sent_arrives_elsewhere_and_not_here(dds, other):
     assert there.name == "/flag"
 
 
-def test_only_latched_topics_reach_those_who_come_late(dds, other):
+def test_only_latched_topics_reach_late_subscribers(dds, other):
     sender = Sender(dds.participant, LATCHED, "rt/latched")
     volatile = Sender(dds.participant, RELIABLE, "rt/volatile")
     for value in (True, False):
@@ -51,15 +51,15 @@ def test_only_latched_topics_reach_those_who_come_late(dds, other):
     assert late_too.take() == []
 
 
-def test_the_last_of_each_sender_reaches_those_who_come_late(dds, other):
+def test_the_last_message_of_each_sender_reaches_late_subscribers(dds, other):
     many = Topic("static", "tf2_msgs/TFMessage", Delivery.LATCHED_MANY)
     message = make("tf2_msgs/TFMessage", transforms=[])
     senders = [Sender(p, many, "rt/static") for p in (dds.participant, other)]
     for sender in senders:
         sender.send(message)
     late = Receiver(DomainParticipant(dds.domain), many, "rt/static")
-    heard = []
-    wait_for(lambda: heard.extend(late.take()) or len(heard) == 2)
+    received = []
+    wait_for(lambda: received.extend(late.take()) or len(received) == 2)
 
 
 def test_a_sender_that_goes_leaves_no_message(dds, other):
@@ -73,7 +73,7 @@ def test_a_sender_that_goes_leaves_no_message(dds, other):
 
 
 @pytest.mark.parametrize("offered", [SENSOR, RELIABLE, LATCHED])
-def test_sensors_are_heard_however_they_publish(dds, other, offered):
+def test_scans_are_received_with_any_reliability(dds, other, offered):
     sender = Sender(dds.participant, offered, "rt/scan")
     receiver = Receiver(other, SENSOR, "rt/scan")
     wait_for(matched(sender))
@@ -85,7 +85,7 @@ def test_sensors_are_heard_however_they_publish(dds, other, offered):
     ("offered", "asked", "policy"),
     [(RELIABLE, LATCHED, "durability"), (SENSOR, RELIABLE, "reliability")],
 )
-def test_both_ends_say_in_which_policy_they_do_not_fit(dds, other, offered, asked, policy):
+def test_both_ends_report_the_incompatible_policy(dds, other, offered, asked, policy):
     sender = Sender(dds.participant, offered, "rt/flag")
     receiver = Receiver(other, asked, "rt/flag")
     assert f"a publisher does not fit in {policy}: " in wait_for(receiver.check_matches)
@@ -94,7 +94,7 @@ def test_both_ends_say_in_which_policy_they_do_not_fit(dds, other, offered, aske
     assert sender.check_matches() is None
 
 
-def test_an_end_that_fits_has_nothing_to_say(dds, other):
+def test_compatible_ends_report_nothing(dds, other):
     sender = Sender(dds.participant, RELIABLE, "rt/flag")
     receiver = Receiver(other, RELIABLE, "rt/flag")
     wait_for(matched(sender))
@@ -114,7 +114,7 @@ def test_listeners_count_when_they_have_had_time_to_find_the_sender(dds, other, 
     wait_for(lambda: sender.check_matches() or sender.subscriber_count == 0)
 
 
-def test_domains_do_not_hear_each_other(dds):
+def test_domains_are_separate(dds):
     number = free_domain()
     elsewhere = Domain(number, LOOPBACK)
     far = Receiver(DomainParticipant(number), LATCHED, "rt/flag")
@@ -128,11 +128,11 @@ def test_domains_do_not_hear_each_other(dds):
 def test_a_watch_looks_at_news_and_survives_a_fault(dds, other):
     sender = Sender(dds.participant, RELIABLE, "rt/flag")
     receiver = Receiver(other, RELIABLE, "rt/flag")
-    heard, complaints = [], []
+    received, complaints = [], []
 
     def look():
-        heard.extend(receiver.take())
-        if len(heard) == 1:
+        received.extend(receiver.take())
+        if len(received) == 1:
             raise OSError("no such luck")
 
     watch = EventThread(other, [receiver.news], look, lambda *what: complaints.append(what))
@@ -142,7 +142,7 @@ def test_a_watch_looks_at_news_and_survives_a_fault(dds, other):
     assert subject == "dds"
     assert "no such luck" in text
     sender.send(YES)
-    wait_for(lambda: len(heard) == 2)
+    wait_for(lambda: len(received) == 2)
     watch.close()
     sender.send(YES)
     assert wait_for(receiver.take)

@@ -30,13 +30,13 @@ def forget_types():
         cached.cache_clear()
 
 
-def test_a_node_tells_what_belongs_to_it(dds, id_size):
+def test_a_node_announces_its_endpoints(dds, id_size):
     receiver = Receiver(dds.participant, FLAG, "rt/flag")
     sender = Sender(dds.participant, PARTICLES, "rt/particle_cloud")
     message = entities(dds.participant, "/robot1", "finder", [receiver.entity], [sender.entity])
-    told = decode(GRAPH.type_name, encode(GRAPH.type_name, message))
-    assert told.gid.data.tobytes() == padded(dds.participant, id_size)
-    (node,) = told.node_entities_info_seq
+    reported = decode(GRAPH.type_name, encode(GRAPH.type_name, message))
+    assert reported.gid.data.tobytes() == padded(dds.participant, id_size)
+    (node,) = reported.node_entities_info_seq
     assert (node.node_namespace, node.node_name) == ("/robot1", "finder")
     assert [gid.data.tobytes() for gid in node.reader_gid_seq] == [padded(receiver.entity, id_size)]
     assert [gid.data.tobytes() for gid in node.writer_gid_seq] == [padded(sender.entity, id_size)]
@@ -46,7 +46,7 @@ def padded(entity, size):
     return entity.guid.bytes + bytes(size - 16)
 
 
-def test_what_comes_late_hears_of_a_node_that_was_there(dds, id_size):
+def test_late_participants_discover_an_earlier_node(dds, id_size):
     participant = DomainParticipant(dds.domain)
     graph = Sender(participant, GRAPH, GRAPH.name)
     graph.send(entities(participant, "/", "finder", [], []))

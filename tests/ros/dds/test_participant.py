@@ -30,7 +30,9 @@ STATUS = "diagnostic_msgs/DiagnosticArray"
 
 
 def states(ear):
-    return [value.value for m in ear.heard for value in m.status[0].values if value.key == "state"]
+    return [
+        value.value for m in ear.received for value in m.status[0].values if value.key == "state"
+    ]
 
 
 def assert_near(truth, pose, metres, radians):
@@ -46,7 +48,7 @@ def test_a_robot_at_rest_is_found_and_its_pose_handed_over_once(dds):
     poses = dds.ear("/initialpose", POSE)
     dds.robot("stand")
     node = dds.node()
-    found = wait_for(lambda: poses.heard)[0]
+    found = wait_for(lambda: poses.received)[0]
     assert found.header.frame_id == "map"
     assert_near(dds.truth(), pose_of(found), 0.1, 0.05)
 
@@ -57,10 +59,10 @@ def test_a_robot_at_rest_is_found_and_its_pose_handed_over_once(dds):
     assert {data.key.bytes for data in poses.senders()} <= writer_ids
 
     time.sleep(2.0)  # long enough for a second one
-    assert len(poses.heard) == 1
+    assert len(poses.received) == 1
     late = dds.ear("/initialpose", POSE)
-    wait_for(lambda: late.heard)
-    assert_near(dds.truth(), pose_of(late.heard[0]), 0.1, 0.05)
+    wait_for(lambda: late.received)
+    assert_near(dds.truth(), pose_of(late.received[0]), 0.1, 0.05)
 
     assert node.end(signal.SIGINT) == 0
     assert "WARN" not in node.log
@@ -74,15 +76,15 @@ def test_nothing_is_handed_over_where_places_look_alike(dds):
     status = dds.ear("/localization_status", STATUS)
     dds.robot("twins")
     node = dds.node()
-    wait_for(lambda: places.heard)
+    wait_for(lambda: places.received)
     here = dds.truth()[0, 1:3]
-    offered = places.heard[-1].poses
+    offered = places.received[-1].poses
     assert len(offered) > 1
     off = [np.hypot(p.position.x - here[0], p.position.y - here[1]) for p in offered]
     assert min(off) < 0.1
     wait_for(lambda: "DISAMBIGUATING" in states(status))
     time.sleep(1.0)
-    assert poses.heard == []
+    assert poses.received == []
     assert node.end() == 0
 
 
@@ -95,9 +97,9 @@ def test_a_carried_robot_is_found_again_on_a_map_that_came_late(dds):
     wait_for(lambda: "LOCALIZED" in states(status))
     wait_for(lambda: len(states(status)) > 3 and "SEARCHING" in states(status)[2:])
     wait_for(lambda: states(status)[-1] == "LOCALIZED")
-    count = len(poses.heard)
-    wait_for(lambda: len(poses.heard) > count + 5)
-    assert_near(dds.truth()[-20:], pose_of(poses.heard[-1]), 0.15, 0.1)
+    count = len(poses.received)
+    wait_for(lambda: len(poses.received) > count + 5)
+    assert_near(dds.truth()[-20:], pose_of(poses.received[-1]), 0.15, 0.1)
 
 
 @pytest.mark.slow
@@ -107,18 +109,18 @@ def test_a_drive_is_followed(dds):
     clouds = dds.ear("/particle_cloud", "nav2_msgs/ParticleCloud", Policy.Reliability.BestEffort)
     dds.node("--ros-args", "-p", "mode:=full")
     dds.robot("drive")
-    wait_for(lambda: poses.heard)
+    wait_for(lambda: poses.received)
     time.sleep(12.0)
     truth = {round(line[0], 3): line for line in dds.truth()}
-    pairs = [(truth.get(round(to_seconds(m.header.stamp), 3)), pose_of(m)) for m in poses.heard]
+    pairs = [(truth.get(round(to_seconds(m.header.stamp), 3)), pose_of(m)) for m in poses.received]
     errors = [np.hypot(t[1] - p[0], t[2] - p[1]) for t, p in pairs if t is not None]
     assert len(errors) > 50
     assert np.percentile(errors, 95) < 0.15
-    ours = [t for m in moves.heard for t in m.transforms if t.header.frame_id == "map"]
+    ours = [t for m in moves.received for t in m.transforms if t.header.frame_id == "map"]
     assert len(ours) >= len(errors)
     assert {t.child_frame_id for t in ours} == {"odom"}
-    assert len(clouds.heard) > 5
-    assert abs(sum(p.weight for p in clouds.heard[-1].particles) - 1.0) < 1e-6
+    assert len(clouds.received) > 5
+    assert abs(sum(p.weight for p in clouds.received[-1].particles) - 1.0) < 1e-6
 
 
 def impostor(dds, topic, kind, size):
@@ -144,9 +146,9 @@ def test_nonsense_on_the_wire_does_not_end_the_node(dds):
                 writer.write(Cdr(b"\0\1\0\0" + bytes(size)))
     poses = dds.ear("/initialpose", POSE)
     dds.robot("stand")
-    wait_for(lambda: poses.heard)
-    assert_near(dds.truth(), pose_of(poses.heard[-1]), 0.1, 0.05)
-    assert "deserialization" in node.log  # Cyclone DDS says so; nothing of it came to Python
+    wait_for(lambda: poses.received)
+    assert_near(dds.truth(), pose_of(poses.received[-1]), 0.1, 0.05)
+    assert "deserialization" in node.log  # logged by Cyclone DDS; no message reached Python
     assert "Traceback" not in node.log
 
 
@@ -172,7 +174,7 @@ def test_a_map_of_four_million_cells_is_used(dds):
 
 
 @pytest.mark.slow
-def test_robots_in_namespaces_do_not_hear_each_other(dds):
+def test_robots_in_namespaces_are_separate(dds):
     ears = {}
     for name, script in (("robot1", "stand"), ("robot2", "kidnapped")):
         ears[name] = dds.ear(f"/{name}/amcl_pose", POSE)
@@ -180,25 +182,25 @@ def test_robots_in_namespaces_do_not_hear_each_other(dds):
         dds.node("--mode", "full", "--namespace", name, *own_tf)
         dds.robot(script, "--namespace", f"/{name}", truth=f"{name}.jsonl")
     for name, ear in ears.items():
-        wait_for(lambda ear=ear: ear.heard)
-        first = ear.heard[0]
+        wait_for(lambda ear=ear: ear.received)
+        first = ear.received[0]
         assert_near(dds.truth(f"{name}.jsonl"), pose_of(first), 0.1, 0.05)
     graphs = dds.ear_named(GRAPH.name, GRAPH.type_name)
-    wait_for(lambda: len(graphs.heard) == 2)
-    places = {m.node_entities_info_seq[0].node_namespace for m in graphs.heard}
+    wait_for(lambda: len(graphs.received) == 2)
+    places = {m.node_entities_info_seq[0].node_namespace for m in graphs.received}
     assert places == {"/robot1", "/robot2"}
 
 
 @pytest.mark.slow
-def test_who_finds_whom_is_as_the_variables_of_ros_say(dds):
+def test_discovery_follows_the_environment_variables_of_ros(dds):
     here = "<General><Interfaces><NetworkInterface name='lo'/></Interfaces></General>"
     near = {"ROS_LOCALHOST_ONLY": "1", "CYCLONEDDS_URI": here}
     alone = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF", "CYCLONEDDS_URI": here}
     graphs = dds.ear_named(GRAPH.name, GRAPH.type_name)
     hidden = dds.node("--name", "hidden", **alone)
     dds.node("--name", "near", **near)
-    wait_for(lambda: graphs.heard and "no message on" in hidden.log)
-    assert {m.node_entities_info_seq[0].node_name for m in graphs.heard} == {"near"}
+    wait_for(lambda: graphs.received and "no message on" in hidden.log)
+    assert {m.node_entities_info_seq[0].node_name for m in graphs.received} == {"near"}
 
 
 @pytest.mark.slow
@@ -207,20 +209,20 @@ def test_a_bag_of_a_real_robot_is_followed(dds, shared):
     case = shared / "cases" / "olin_mac1_9_23"
     poses = dds.ear("/amcl_pose", POSE)
     status = dds.ear("/localization_status", STATUS)
-    told = ("--map", str(case / "map.yaml"), "--mode", "full", "--base-frame", "base_link")
-    node = dds.node(*told)
+    reported = ("--map", str(case / "map.yaml"), "--mode", "full", "--base-frame", "base_link")
+    node = dds.node(*reported)
     wait_for(lambda: "SEARCHING" in states(status))
     player = dds.player(shared / "bags" / "olin_ros2", 4.0, "scan", "tf", "tf_static")
     assert player.process.wait(300.0) == 0, player.log
     scans = np.load(case / "scans.npz")
     truth = dict(zip(np.round(scans["stamp"], 3), scans["true_pose"], strict=True))
-    pairs = [(truth.get(round(to_seconds(m.header.stamp), 3)), pose_of(m)) for m in poses.heard]
+    pairs = [(truth.get(round(to_seconds(m.header.stamp), 3)), pose_of(m)) for m in poses.received]
     errors = [np.hypot(t[0] - p[0], t[1] - p[1]) for t, p in pairs if t is not None]
     assert len(errors) > 20, node.log
     assert np.percentile(errors, 95) < 0.3  # of the laser, which sits 4 mm from the base
 
 
-def test_without_cyclone_dds_the_command_says_what_to_install(monkeypatch, capsys):
+def test_without_cyclone_dds_the_error_names_the_package(monkeypatch, capsys):
     for name in [name for name in sys.modules if name.startswith("firstfix.ros.dds")]:
         monkeypatch.delitem(sys.modules, name)
     for name in [name for name in sys.modules if name.partition(".")[0] == "cyclonedds"]:

@@ -20,7 +20,7 @@ HEARD = subscribed_topics(NodeConfig())
 
 
 @pytest.mark.parametrize(
-    ("heard", "reliable", "latched", "depth"),
+    ("received", "reliable", "latched", "depth"),
     [
         (Channel.SCAN, False, False, 5),
         (Channel.ODOM, False, False, 5),
@@ -31,14 +31,14 @@ HEARD = subscribed_topics(NodeConfig())
         (Channel.WHEEL_DROP, True, False, 10),
     ],
 )
-def test_topics_are_delivered_as_nav2_delivers_them(heard, reliable, latched, depth):
-    policies = set(quality(HEARD[heard]))
+def test_topics_are_delivered_as_nav2_delivers_them(received, reliable, latched, depth):
+    policies = set(quality(HEARD[received]))
     assert (Policy.Reliability.BestEffort not in policies) is reliable
     assert (Policy.Durability.TransientLocal in policies) is latched
     assert Policy.History.KeepLast(depth) in policies
 
 
-def test_everything_travels_as_plain_cdr_and_is_not_heard_here():
+def test_data_is_plain_cdr_and_own_messages_are_ignored():
     topics = [*HEARD.values(), *published_topics(NodeConfig(mode=Mode.FULL), PARTICLES)]
     for topic in topics:
         policies = set(quality(topic))
@@ -46,7 +46,7 @@ def test_everything_travels_as_plain_cdr_and_is_not_heard_here():
         assert Policy.IgnoreLocal.Participant in policies
 
 
-def test_endpoints_tell_the_hash_of_their_type():
+def test_endpoints_announce_the_hash_of_their_type():
     topic = Topic("flag", "std_msgs/Bool", Delivery.RELIABLE)
-    told = next(p.data for p in quality(topic) if isinstance(p, Policy.Userdata))
-    assert told.decode() == f"typehash={type_hash('std_msgs/Bool')};"
+    reported = next(p.data for p in quality(topic) if isinstance(p, Policy.Userdata))
+    assert reported.decode() == f"typehash={type_hash('std_msgs/Bool')};"

@@ -70,7 +70,7 @@ def rosbags_own():
     return store
 
 
-def test_every_type_that_is_heard_or_said_is_among_those_tested_here():
+def test_every_type_of_a_channel_is_tested_here():
     topics = [*subscribed_topics(NodeConfig()).values()]
     for mode in Mode:
         topics += published_topics(NodeConfig(mode=mode), PARTICLES)
@@ -97,8 +97,12 @@ def test_what_was_meant_arrives():
     assert (pose.parent, pose.stamp) == ("map", 2.0)
     assert to_pressed(decode(*there("kobuki/CliffEvent"))) == (1, True)
     assert to_pressed(decode(*there("std_msgs/Bool"))) == (0, True)
-    said = decode(*there("diagnostic_msgs/DiagnosticArray")).status[0]
-    assert (said.level, said.message, said.values[0].value) == (1, "SEARCHING: é", "SEARCHING")
+    reported = decode(*there("diagnostic_msgs/DiagnosticArray")).status[0]
+    assert (reported.level, reported.message, reported.values[0].value) == (
+        1,
+        "SEARCHING: é",
+        "SEARCHING",
+    )
 
 
 def only(kind):
@@ -142,7 +146,7 @@ def test_a_message_with_wrong_bytes_is_a_message_or_an_error_of_ours(kind, drawn
         (GRAPH.type_name, "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"),
     ],
 )
-def test_dds_knows_types_by_the_names_that_ros_gives_them(kind, name):
+def test_types_have_the_names_of_ros_in_dds(kind, name):
     about = described(kind).__idl__
     about.populate()
     assert about.idl_transformed_typename == name

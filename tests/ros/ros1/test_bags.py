@@ -30,15 +30,15 @@ def test_a_bag_that_begins_anew_is_noticed_and_the_robot_found_again(
     player.start("rosbag", "play", "--clock", "--loop", "--quiet", tmp_path / "stand.bag")
 
     again = re.compile("LOCALIZED.*time went back by.*SEARCHING.*LOCALIZED", re.DOTALL)
-    wait_until(lambda: again.search(node.said), lambda: node.said)
-    said = again.search(node.said)
-    assert said is not None
-    assert said[0].count("time went back by") == 1
-    wait_until(lambda: len(watcher.lines("initialpose")) > 1, lambda: node.said)
+    wait_until(lambda: again.search(node.output), lambda: node.output)
+    reported = again.search(node.output)
+    assert reported is not None
+    assert reported[0].count("time went back by") == 1
+    wait_until(lambda: len(watcher.lines("initialpose")) > 1, lambda: node.output)
     for found in watcher.lines("initialpose"):
         assert 1000.0 <= found["stamp"] <= 1006.0
         assert apart(found, truth).is_small
-    assert "Traceback" not in node.said
+    assert "Traceback" not in node.output
 
 
 @pytest.mark.shared
@@ -50,11 +50,11 @@ def test_a_recorded_robot_is_found(player: Lab, shared: Path) -> None:
     node = player.node(
         "scan:=base_scan", "_base_frame_id:=base_link", f"_yaml_filename:={case / 'map.yaml'}"
     )
-    node.wait_to_say("SEARCHING")
+    node.wait_for_output("SEARCHING")
     player.start("rosbag", "play", "--clock", "--quiet", "-u", "20", bag)
     found = watcher.wait_for("initialpose")
 
-    # What the AMCL of that robot said at that time.
+    # The estimate of the AMCL of that robot at that time.
     links = []
     for frames in (["map", "odom"], ["odom", "base_link"]):
         lines = watcher.lines("/tf", frames=frames)

@@ -1,4 +1,4 @@
-"""`firstfix ros1` beside an AMCL, on a real master: it hands over a pose, once."""
+"""`firstfix ros1` with an AMCL, on a real master: it publishes initialpose, once."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ pytestmark = pytest.mark.slow
 A_WHILE_S = 2.0
 
 
-def test_a_robot_at_rest_is_found_once_and_latecomers_are_told(ros1: Lab) -> None:
+def test_a_robot_at_rest_is_found_once_and_late_subscribers_get_the_pose(ros1: Lab) -> None:
     watcher = ros1.watch("initialpose", "amcl_pose", "localization_status", "/tf")
     ros1.node()
     ros1.robot("stand")
     found = watcher.wait_for("initialpose")
     assert ros1.error_of(found).is_small
     assert found["frame"] == "map"
-    told = watcher.wait_for("localization_status", state="LOCALIZED")
-    assert (told["level"], told["mode"]) == (0, "bootstrap")
+    reported = watcher.wait_for("localization_status", state="LOCALIZED")
+    assert (reported["level"], reported["mode"]) == (0, "bootstrap")
     time.sleep(A_WHILE_S)
     assert len(watcher.lines("initialpose")) == 1
     assert not watcher.lines("amcl_pose")
@@ -39,14 +39,14 @@ def test_a_robot_at_rest_is_found_once_and_latecomers_are_told(ros1: Lab) -> Non
         late.end()
 
 
-def test_places_that_look_alike_are_told_instead_of_a_pose(ros1: Lab) -> None:
+def test_identical_places_are_published_instead_of_a_pose(ros1: Lab) -> None:
     watcher = ros1.watch("initialpose", "hypotheses", "localization_status")
     ros1.node()
     robot = ros1.robot("twins")
-    told = watcher.wait_for("localization_status", state="DISAMBIGUATING")
-    assert told["level"] == 1
-    assert "4 places look identical to this sensor" in told["message"]
-    assert len(watcher.wait_for("hypotheses")["places"]) == int(told["hypotheses"]) > 1
+    reported = watcher.wait_for("localization_status", state="DISAMBIGUATING")
+    assert reported["level"] == 1
+    assert "4 places look identical to this sensor" in reported["message"]
+    assert len(watcher.wait_for("hypotheses")["places"]) == int(reported["hypotheses"]) > 1
     time.sleep(A_WHILE_S)
     assert not watcher.lines("initialpose")
 
@@ -56,11 +56,11 @@ def test_places_that_look_alike_are_told_instead_of_a_pose(ros1: Lab) -> None:
     x, y = min(late["places"], key=lambda place: abs(place[0] - truth.x) + abs(place[1] - truth.y))
     assert abs(x - truth.x) + abs(y - truth.y) < 0.2
 
-    robot.tell(hint=[truth.x + 0.2, truth.y - 0.2, truth.yaw + 0.2])
-    said = watcher.wait_for("localization_status", state="LOCALIZED")
-    assert "chosen by a person" in said["message"]
+    robot.command(hint=[truth.x + 0.2, truth.y - 0.2, truth.yaw + 0.2])
+    reported = watcher.wait_for("localization_status", state="LOCALIZED")
+    assert "chosen by a person" in reported["message"]
     handed_over = wait_until(
-        lambda: watcher.lines("initialpose")[1:], lambda: "only what the person said"
+        lambda: watcher.lines("initialpose")[1:], lambda: "only the hint of the person"
     )[0]
     assert ros1.error_of(handed_over).is_small
     # The places that were left are gone.
@@ -72,20 +72,20 @@ def test_the_robot_is_searched_again_on_request_and_in_another_map(ros1: Lab) ->
     node = ros1.node()
     robot = ros1.robot("stand")
     found = watcher.wait_for("initialpose")
-    robot.tell()
+    robot.command()
     time.sleep(A_WHILE_S)
     assert len(watcher.lines("initialpose")) == 1, "the same map came again, and was taken as new"
-    assert node.said.count("SEARCHING") == 1
+    assert node.output.count("SEARCHING") == 1
 
-    robot.tell(ask="firstfix/request_nomotion_update")  # the name without a node is AMCL's
+    robot.command(ask="firstfix/request_nomotion_update")  # the name without a node is AMCL's
     for name in ("reinitialize_global_localization", "global_localization"):
         since = time.time()
-        robot.tell(ask=name)
+        robot.command(ask=name)
         assert watcher.wait_for("localization_status", since, state="SEARCHING")["level"] == 1
         assert ros1.error_of(watcher.wait_for("initialpose", about_after=since)).is_small
 
     since = time.time()
-    robot.tell(shift=[10.0, -5.0, 1.5])
+    robot.command(shift=[10.0, -5.0, 1.5])
     elsewhere = watcher.wait_for("initialpose", about_after=since)
     shifted = SE2(10.0, -5.0, 1.5) @ ros1.truth_at(elsewhere["stamp"])
     assert apart(elsewhere, shifted).is_small

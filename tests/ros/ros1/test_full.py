@@ -69,7 +69,7 @@ def test_a_robot_that_is_carried_away_is_found_where_it_is_set_down(ros1: Lab) -
     time.sleep(1.0)
     assert len(watcher.lines("initialpose")) == 1
 
-    robot.tell(go=True)
+    robot.command(go=True)
     lifted = watcher.wait_for("events/wheel_drop", state=1)
     lost = watcher.wait_for("localization_status", state="LIFTED", after=lifted["at"] - 0.5)
     assert "waiting until the robot is set down" in lost["message"]
@@ -83,10 +83,10 @@ def test_a_robot_that_is_carried_away_is_found_where_it_is_set_down(ros1: Lab) -
         assert ros1.error_of(found).is_small
         assert abs(found["pose"][0] - before["pose"][0]) > 1.0
     assert watcher.lines("localization_status")[-1]["state"] == "LOCALIZED"
-    assert "Traceback" not in follower.said + helper.said
+    assert "Traceback" not in follower.output + helper.output
 
 
-def test_at_rest_a_scan_is_used_on_request_and_latecomers_are_told(ros1: Lab) -> None:
+def test_at_rest_a_scan_is_used_on_request_and_late_subscribers_get_the_pose(ros1: Lab) -> None:
     watcher = ros1.watch("amcl_pose", "particle_cloud")
     ros1.node("_mode:=full")
     robot = ros1.robot("stand")
@@ -100,7 +100,7 @@ def test_at_rest_a_scan_is_used_on_request_and_latecomers_are_told(ros1: Lab) ->
         lambda: "a filter that updates at rest",
     )
     at_rest = clouds()[-1]
-    robot.tell(ask="request_nomotion_update")
+    robot.command(ask="request_nomotion_update")
     wait_until(lambda: clouds()[-1] != at_rest, lambda: "no update of the filter")
 
     # Also when the robot has fallen silent.
@@ -111,7 +111,7 @@ def test_at_rest_a_scan_is_used_on_request_and_latecomers_are_told(ros1: Lab) ->
 
 
 @pytest.mark.parametrize("source", ["service", "file"])
-def test_the_map_comes_from_where_it_is_said_to_be(ros1: Lab, source: str, tmp_path: Path) -> None:
+def test_the_map_comes_from_its_configured_source(ros1: Lab, source: str, tmp_path: Path) -> None:
     watcher = ros1.watch("initialpose")
     if source == "service":
         ros1.node("_use_map_topic:=false")

@@ -54,7 +54,7 @@ def test_the_launch_file_starts_a_node_and_starts_it_again(ros1: Lab, prefix: Pa
         lambda: (
             ros1.master.pid_of("/firstfix") not in (0, first) and ros1.master.pid_of("/firstfix")
         ),
-        lambda: launch.said,
+        lambda: launch.output,
     )
     last = watcher.lines("amcl_pose")[-1]["stamp"]
     assert ros1.error_of(watcher.wait_for("amcl_pose", about_after=last + 0.01)).is_small
@@ -62,4 +62,4 @@ def test_the_launch_file_starts_a_node_and_starts_it_again(ros1: Lab, prefix: Pa
     launch.send(signal.SIGINT)
     assert launch.wait() == 0
     assert not Path(f"/proc/{second}").exists()
-    assert "Traceback" not in launch.said
+    assert "Traceback" not in launch.output

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGINT])
-def test_in_one_of_four_equal_rooms_a_node_that_is_restarted_knows_its_room(
+def test_in_one_of_four_equal_rooms_a_restarted_node_finds_its_room(
     ros1: Lab, tmp_path: Path, end: signal.Signals
 ) -> None:
     file = tmp_path / "pose.json"
@@ -24,10 +24,10 @@ def test_in_one_of_four_equal_rooms_a_node_that_is_restarted_knows_its_room(
     assert not watcher.lines("initialpose")
 
     here = ros1.truth_at(watcher.wait_for("scan")["stamp"])
-    robot.tell(hint=[here.x, here.y, here.yaw])
+    robot.command(hint=[here.x, here.y, here.yaw])
     watcher.wait_for("localization_status", state="LOCALIZED")
-    robot.tell(gone=True)
-    wait_until(file.exists, lambda: f"no {file}; {first.said}")
+    robot.command(gone=True)
+    wait_until(file.exists, lambda: f"no {file}; {first.output}")
     first.send(end)
     first.wait()
 
@@ -36,5 +36,5 @@ def test_in_one_of_four_equal_rooms_a_node_that_is_restarted_knows_its_room(
     found = watcher.wait_for("initialpose", after=killed)
     assert ros1.error_of(found).is_small
     # It has not moved since it was switched on.
-    assert "the saved pose is used as it was saved: saved " in second.said
-    assert "LOCALIZED: chosen by the saved pose; " in second.said
+    assert "the saved pose is used as it was saved: saved " in second.output
+    assert "LOCALIZED: chosen by the saved pose; " in second.output

@@ -1,4 +1,4 @@
-"""`firstfix ros1` where something is wrong, on a real master: it says so, goes on, ends well."""
+"""`firstfix ros1` with faults, on a real master: it reports them, continues and ends cleanly."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ros1_lab import Lab, Program, wait_until
 pytestmark = pytest.mark.slow
 
 
-def test_what_is_missing_is_said_and_waited_for(ros1: Lab) -> None:
+def test_missing_topics_are_reported_and_awaited(ros1: Lab) -> None:
     watcher = ros1.watch("initialpose")
     node = ros1.node()
     flaws = ["no map", "no scan", "no stamp", "no odometry", "no laser frame", "map elsewhere"]
@@ -27,30 +27,30 @@ def test_what_is_missing_is_said_and_waited_for(ros1: Lab) -> None:
         ("no map", "the map is in 'second_floor', not in 'map': used as it is"),
     ):
         flaws = [flaw for flaw in flaws if flaw != mended]
-        robot.tell(flaws=flaws)
-        node.wait_to_say(warning)
+        robot.command(flaws=flaws)
+        node.wait_for_output(warning)
     assert not watcher.lines("initialpose")
-    robot.tell(flaws=["map elsewhere"])
+    robot.command(flaws=["map elsewhere"])
     found = watcher.wait_for("initialpose")
     assert ros1.error_of(found).is_small
     assert found["frame"] == "map"
-    assert "Traceback" not in node.said
+    assert "Traceback" not in node.output
     assert_throttled(node)
 
 
 def assert_throttled(node: Program) -> None:
     """See to it that no sentence comes again within ten seconds."""
     said_at: dict[str, float] = {}
-    for stamp, text in re.findall(r"\[WARN\] \[([\d.]+)\]: (.*)", node.said):
+    for stamp, text in re.findall(r"\[WARN\] \[([\d.]+)\]: (.*)", node.output):
         about = re.sub(r"\d+", "", text)[:50]
-        assert float(stamp) - said_at.get(about, 0.0) > 9.9, node.said
+        assert float(stamp) - said_at.get(about, 0.0) > 9.9, node.output
         said_at[about] = float(stamp)
 
 
-def test_a_base_frame_that_no_transform_tells_of_is_named_with_those_there_are(ros1: Lab) -> None:
+def test_a_base_frame_without_transforms_is_reported_with_the_known_frames(ros1: Lab) -> None:
     node = ros1.node("_base_frame_id:=base_lynk")
     ros1.robot("stand")
-    node.wait_to_say(
+    node.wait_for_output(
         "no transform has the frame base_lynk; known frames: base_footprint, laser, odom"
     )
     time.sleep(2.0)
@@ -72,28 +72,28 @@ def test_a_node_that_was_killed_finds_the_robot_again_and_signals_end_it_well(ro
         assert ros1.error_of(watcher.wait_for("initialpose", since)).is_small
         node.send(how)
         assert node.wait() == 0
-        assert "Traceback" not in node.said
+        assert "Traceback" not in node.output
 
 
 def test_a_node_ends_well_while_its_kernels_are_compiled(ros1: Lab, tmp_path: Path) -> None:
     ros1.master.environment["NUMBA_CACHE_DIR"] = str(tmp_path / "nothing compiled yet")
     node = ros1.node("_mode:=full")
-    wait_until(lambda: ros1.master.publishers("/amcl_pose"), lambda: node.said)
+    wait_until(lambda: ros1.master.publishers("/amcl_pose"), lambda: node.output)
     time.sleep(2.0)
     node.send(signal.SIGINT)
     assert node.wait() == 0
-    assert "Traceback" not in node.said
+    assert "Traceback" not in node.output
     # It took leave, and did not take the goodbye for a new master.
     assert not ros1.master.publishers("/amcl_pose")
-    assert "registering anew" not in node.said
+    assert "registering anew" not in node.output
 
 
-def test_another_master_is_told_everything_anew(ros1: Lab) -> None:
+def test_the_node_registers_again_with_another_master(ros1: Lab) -> None:
     ros1.master.end()
     watcher = ros1.watch("amcl_pose")
     node = ros1.node("_mode:=full")
     robot = ros1.robot("stand")
-    node.wait_to_say("waiting for the ROS master")
+    node.wait_for_output("waiting for the ROS master")
     ros1.master.start()
     watcher.wait_for("amcl_pose")
 
@@ -102,9 +102,9 @@ def test_another_master_is_told_everything_anew(ros1: Lab) -> None:
     # What is connected stays so.
     watcher.wait_for("amcl_pose", after=gone + 1.0)
     ros1.master.start()
-    node.wait_to_say("the master was restarted: registering anew")
+    node.wait_for_output("the master was restarted: registering anew")
     for topic in ("/amcl_pose", "/localization_status", "/rosout"):
-        wait_until(lambda topic=topic: ros1.master.publishers(topic), lambda: node.said)
+        wait_until(lambda topic=topic: ros1.master.publishers(topic), lambda: node.output)
     back = time.time()
     assert watcher.wait_for("amcl_pose", after=back)
 
@@ -114,11 +114,11 @@ def test_another_master_is_told_everything_anew(ros1: Lab) -> None:
     since = time.time()
     robot = ros1.robot("stand")
     assert ros1.error_of(again.wait_for("amcl_pose", about_after=since)).is_small
-    robot.tell(ask="reinitialize_global_localization")
+    robot.command(ask="reinitialize_global_localization")
     lost = again.wait_for("localization_status", about_after=since, state="SEARCHING")
     again.wait_for("localization_status", about_after=lost["stamp"], state="LOCALIZED")
     again.wait_for("/rosout_agg", after=since, node="/firstfix")
-    assert "Traceback" not in node.said
+    assert "Traceback" not in node.output
 
 
 def test_a_parameter_that_cannot_be_used_ends_the_node_with_a_sentence(ros1: Lab) -> None:
@@ -137,7 +137,9 @@ def test_a_parameter_that_cannot_be_used_ends_the_node_with_a_sentence(ros1: Lab
     ]
     for node, expected in nodes:
         assert node.wait() == 2
-        said = [line for line in node.said.splitlines() if "waiting for the ROS master" not in line]
-        assert len(said) == 1, said
-        assert said[0].startswith("firstfix: ")
-        assert expected in said[0]
+        reported = [
+            line for line in node.output.splitlines() if "waiting for the ROS master" not in line
+        ]
+        assert len(reported) == 1, reported
+        assert reported[0].startswith("firstfix: ")
+        assert expected in reported[0]

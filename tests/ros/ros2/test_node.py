@@ -42,18 +42,20 @@ def succeeds(lab: Lab, *results) -> bool:
     return all(result is lab.lifecycle.TransitionCallbackReturn.SUCCESS for result in results)
 
 
-def test_a_robot_is_found_and_amcl_is_told_once(lab: Lab, hall_plan: OccupancyGrid) -> None:
+def test_a_robot_is_found_and_initialpose_is_published_once(
+    lab: Lab, hall_plan: OccupancyGrid
+) -> None:
     node = lab.node()
     robot = Robot(lab, hall_plan, HERE)
-    told = lab.hears("initialpose", POSE)
-    status = lab.hears("localization_status", STATUS, is_latched=True)
+    reported = lab.subscribe("initialpose", POSE)
+    status = lab.subscribe("localization_status", STATUS, is_latched=True)
     assert succeeds(lab, node.trigger_configure(), node.trigger_activate())
     robot.look_until(lambda: any(s.status[0].level == b"\0" for s in status))
     for _ in range(5):
         robot.look()
-    assert len(told) == 1
-    assert is_near(told[0], HERE)
-    assert told[0].header.frame_id == "map"
+    assert len(reported) == 1
+    assert is_near(reported[0], HERE)
+    assert reported[0].header.frame_id == "map"
     assert any("LOCALIZED" in line.upper() for line in lab.world.lines("info"))
     assert not lab.world.lines("error")
 
@@ -61,9 +63,9 @@ def test_a_robot_is_found_and_amcl_is_told_once(lab: Lab, hall_plan: OccupancyGr
 def test_without_amcl_it_follows_the_robot(lab: Lab, hall_plan: OccupancyGrid) -> None:
     node = lab.node("-p", "mode:=full")
     robot = Robot(lab, hall_plan, HERE)
-    poses = lab.hears("amcl_pose", POSE, is_latched=True)
-    moved = lab.hears("/tf", "tf2_msgs/TFMessage", depth=100)
-    clouds = lab.hears("particle_cloud", "nav2_msgs/ParticleCloud", is_sensor=True)
+    poses = lab.subscribe("amcl_pose", POSE, is_latched=True)
+    moved = lab.subscribe("/tf", "tf2_msgs/TFMessage", depth=100)
+    clouds = lab.subscribe("particle_cloud", "nav2_msgs/ParticleCloud", is_sensor=True)
     assert succeeds(lab, node.trigger_configure(), node.trigger_activate())
     robot.look_until(lambda: poses and clouds)
     assert is_near(poses[-1], HERE)
@@ -80,7 +82,7 @@ def test_without_nav2_msgs_clouds_are_poses(
     lab = Lab(monkeypatch, optional=())
     node = lab.node("-p", "mode:=full")
     robot = Robot(lab, hall_plan, HERE)
-    clouds = lab.hears("particle_cloud", "geometry_msgs/PoseArray", is_sensor=True)
+    clouds = lab.subscribe("particle_cloud", "geometry_msgs/PoseArray", is_sensor=True)
     assert succeeds(lab, node.trigger_configure(), node.trigger_activate())
     robot.look_until(lambda: clouds)
     lab.end()
@@ -93,8 +95,8 @@ def test_without_nav2_msgs_clouds_are_poses(
 def test_it_is_silent_and_deaf_unless_active(lab: Lab, hall_plan: OccupancyGrid) -> None:
     node = lab.node("-p", "mode:=full")
     robot = Robot(lab, hall_plan, HERE)
-    poses = lab.hears("amcl_pose", POSE, is_latched=True)
-    moved = lab.hears("/tf", "tf2_msgs/TFMessage", depth=100)
+    poses = lab.subscribe("amcl_pose", POSE, is_latched=True)
+    moved = lab.subscribe("/tf", "tf2_msgs/TFMessage", depth=100)
     node.trigger_configure()
     for _ in range(20):
         robot.look()
@@ -102,17 +104,19 @@ def test_it_is_silent_and_deaf_unless_active(lab: Lab, hall_plan: OccupancyGrid)
     assert not poses
     robot.look_until(lambda: len(poses) > 2)
     node.trigger_deactivate()
-    said = len(poses), len([m for m in moved if m.transforms[0].header.frame_id == "map"])
+    reported = len(poses), len([m for m in moved if m.transforms[0].header.frame_id == "map"])
     for _ in range(20):
         robot.look()
     node.trigger_activate()
     before = len(poses), len([m for m in moved if m.transforms[0].header.frame_id == "map"])
-    assert before == said
-    robot.look_until(lambda: len(poses) > said[0])
+    assert before == reported
+    robot.look_until(lambda: len(poses) > reported[0])
     assert is_near(poses[-1], HERE)
 
 
-def test_what_is_latched_is_heard_before_it_is_active(lab: Lab, hall_plan: OccupancyGrid) -> None:
+def test_latched_messages_are_received_before_activation(
+    lab: Lab, hall_plan: OccupancyGrid
+) -> None:
     node = lab.node()
     Robot(lab, hall_plan, HERE)
     node.trigger_configure()
@@ -141,7 +145,7 @@ def test_all_is_given_back_and_it_can_be_configured_anew(
     assert len(lab.world.ends) == others
     assert lab.world.services == {}
     node.set_parameter("mode", "full")
-    poses = lab.hears("amcl_pose", POSE, is_latched=True)
+    poses = lab.subscribe("amcl_pose", POSE, is_latched=True)
     assert succeeds(lab, node.trigger_configure(), node.trigger_activate())
     robot.look_until(lambda: poses)
     assert succeeds(lab, node.trigger_shutdown())
@@ -163,7 +167,7 @@ def test_all_is_given_back_and_it_can_be_configured_anew(
         ("scan_topic:=front scan", "front scan"),
     ],
 )
-def test_a_bad_parameter_is_told_in_one_line(lab: Lab, given: str, words: str) -> None:
+def test_a_bad_parameter_is_reported_in_one_line(lab: Lab, given: str, words: str) -> None:
     node = lab.node("-p", given)
     assert node.trigger_configure() is lab.lifecycle.TransitionCallbackReturn.FAILURE
     (line,) = lab.world.lines("error")
@@ -232,18 +236,18 @@ def test_every_parameter_is_declared_with_its_meaning(lab: Lab) -> None:
 
 
 def test_run_starts_by_itself_if_asked(lab: Lab, hall_plan: OccupancyGrid) -> None:
-    told = []
+    reported = []
 
     def during_spin(node) -> None:
         assert node.name == "firstfix"
         robot = Robot(lab, hall_plan, HERE)
-        told.append(lab.hears("/pose", POSE))
-        robot.look_until(lambda: told[0])
+        reported.append(lab.subscribe("/pose", POSE))
+        robot.look_until(lambda: reported[0])
 
     lab.world.during_spin = during_spin
     given = ["--ros-args", "-p", "autostart:=true", "-r", "initialpose:=/pose"]
     lab.ros2.run(given)
-    assert is_near(told[0][0], HERE)
+    assert is_near(reported[0][0], HERE)
     assert not lab.rclpy.ok()
 
 
@@ -312,7 +316,7 @@ def test_good_values_and_those_of_ros_are_accepted(lab: Lab) -> None:
 
 def test_an_active_node_sends_heartbeats_to_the_lifecycle_manager(lab: Lab) -> None:
     node = lab.node()
-    beats = lab.hears("bond", "bond/Status")
+    beats = lab.subscribe("bond", "bond/Status")
     node.trigger_configure()
     assert not lab.world.timers
     node.trigger_activate()
@@ -331,13 +335,13 @@ def test_an_active_node_sends_heartbeats_to_the_lifecycle_manager(lab: Lab) -> N
 
 def test_a_bond_timeout_of_zero_means_no_bond(lab: Lab) -> None:
     node = lab.node("-p", "bond_timeout:=0.0")
-    beats = lab.hears("bond", "bond/Status")
+    beats = lab.subscribe("bond", "bond/Status")
     assert succeeds(lab, node.trigger_configure(), node.trigger_activate())
     assert not beats
     assert not lab.world.timers
 
 
-def test_a_bad_bond_timeout_is_told_in_one_line(lab: Lab) -> None:
+def test_a_bad_bond_timeout_is_reported_in_one_line(lab: Lab) -> None:
     node = lab.node("-p", "bond_timeout:=-1.0")
     assert node.trigger_configure() is lab.lifecycle.TransitionCallbackReturn.FAILURE
     assert "bond_timeout in seconds" in lab.world.lines("error")[0]
@@ -350,7 +354,7 @@ def test_what_is_cleaned_up_is_freed(lab: Lab, hall_plan: OccupancyGrid) -> None
     """Without waiting for the collector of cycles, which arrays of 25 MB do not trigger."""
     node = lab.node("-p", "mode:=full")
     robot = Robot(lab, hall_plan, HERE)
-    poses = lab.hears("amcl_pose", POSE, is_latched=True)
+    poses = lab.subscribe("amcl_pose", POSE, is_latched=True)
     assert succeeds(lab, node.trigger_configure(), node.trigger_activate())
     robot.look_until(lambda: poses)
     transport = node._transport

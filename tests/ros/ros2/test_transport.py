@@ -34,12 +34,12 @@ def states(lab: Lab, hall_plan: OccupancyGrid) -> tuple[Robot, list[Any]]:
     """Give a robot that has been found, and a list of all status messages since."""
     node = lab.node()
     robot = Robot(lab, hall_plan, HERE)
-    heard = lab.hears("localization_status", STATUS, is_latched=True)
+    received = lab.subscribe("localization_status", STATUS, is_latched=True)
     node.trigger_configure()
     node.trigger_activate()
-    robot.look_until(lambda: heard and state_of(heard[-1]) == "LOCALIZED")
-    heard.clear()
-    return robot, heard
+    robot.look_until(lambda: received and state_of(received[-1]) == "LOCALIZED")
+    received.clear()
+    return robot, received
 
 
 def state_of(message) -> str:
@@ -52,42 +52,42 @@ def is_there(message) -> bool:
 
 
 def test_a_search_can_be_asked_for(lab: Lab, states) -> None:
-    robot, heard = states
+    robot, received = states
     lab.world.ask("reinitialize_global_localization")
-    robot.look_until(lambda: any(state_of(m) == "SEARCHING" for m in heard))
-    robot.look_until(lambda: state_of(heard[-1]) == "LOCALIZED")
+    robot.look_until(lambda: any(state_of(m) == "SEARCHING" for m in received))
+    robot.look_until(lambda: state_of(received[-1]) == "LOCALIZED")
 
 
 def test_an_update_can_be_asked_for(lab: Lab, states) -> None:
-    robot, heard = states
+    robot, received = states
     lab.world.ask("request_nomotion_update")
-    robot.look_until(lambda: heard)
-    assert {state_of(m) for m in heard} == {"LOCALIZED"}
+    robot.look_until(lambda: received)
+    assert {state_of(m) for m in received} == {"LOCALIZED"}
 
 
 @pytest.mark.parametrize("way", ["service", "topic"])
-def test_a_person_can_say_where_it_is(lab: Lab, states, way: str) -> None:
+def test_a_person_can_give_a_hint(lab: Lab, states, way: str) -> None:
     robot, _ = states
-    told = lab.hears("initialpose", POSE)
+    reported = lab.subscribe("initialpose", POSE)
     robot.T_map_base = ELSEWHERE
     hint = pose_with_covariance(robot.make, robot.stamp, "map", ELSEWHERE, 0.01 * np.eye(3))
     if way == "service":
         request = lab.types.find("srv", "nav2_msgs/SetInitialPose").Request(pose=hint)
         lab.world.ask("set_initial_pose", request)
     else:
-        lab.says("initialpose", POSE).publish(hint)
-    robot.look_until(lambda: any(message is not hint and is_there(message) for message in told))
+        lab.advertise("initialpose", POSE).publish(hint)
+    robot.look_until(lambda: any(message is not hint and is_there(message) for message in reported))
 
 
 def test_a_wheel_that_drops_makes_it_search(lab: Lab, states) -> None:
-    robot, heard = states
-    told = lab.hears("initialpose", POSE)
-    wheel = lab.says("events/wheel_drop", "kobuki/WheelDropEvent")
+    robot, received = states
+    reported = lab.subscribe("initialpose", POSE)
+    wheel = lab.advertise("events/wheel_drop", "kobuki/WheelDropEvent")
     wheel.publish(robot.make("kobuki/WheelDropEvent", wheel=0, state=1))
     robot.T_map_base = ELSEWHERE
     wheel.publish(robot.make("kobuki/WheelDropEvent", wheel=0, state=0))
-    robot.look_until(lambda: any(is_there(message) for message in told))
-    assert "SEARCHING" in {state_of(m) for m in heard}
+    robot.look_until(lambda: any(is_there(message) for message in reported))
+    assert "SEARCHING" in {state_of(m) for m in received}
 
 
 def test_services_that_come_too_early_have_no_effect(lab: Lab) -> None:

@@ -83,15 +83,15 @@ class World:
         """Disconnect an end."""
         self.ends.remove(end)
 
-    def says(self, kind: Any, topic: str, quality: QoSProfile) -> End:
+    def advertise(self, kind: Any, topic: str, quality: QoSProfile) -> End:
         """Return a publisher of a test."""
         return self.join(End(kind, topic, quality))
 
-    def hears(self, kind: Any, topic: str, quality: QoSProfile) -> list[Any]:
+    def subscribe(self, kind: Any, topic: str, quality: QoSProfile) -> list[Any]:
         """Return a list that grows with what the node publishes."""
-        heard: list[Any] = []
-        self.join(End(kind, topic, quality, heard.append))
-        return heard
+        received: list[Any] = []
+        self.join(End(kind, topic, quality, received.append))
+        return received
 
     def ask(self, service: str, request: Any = None) -> Any:
         """Call a service."""

@@ -97,16 +97,16 @@ class LifecycleNode(Node):
         assert isinstance(result, TransitionCallbackReturn)
         return result
 
-    def _tell(self, *, is_activated: bool) -> TransitionCallbackReturn:
+    def _notify(self, *, is_activated: bool) -> TransitionCallbackReturn:
         for publisher in self._managed_entities:
             publisher.is_activated = is_activated
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._tell(is_activated=True)
+        return self._notify(is_activated=True)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._tell(is_activated=False)
+        return self._notify(is_activated=False)
 
     def _pass(self, state: LifecycleState) -> TransitionCallbackReturn:
         return TransitionCallbackReturn.SUCCESS
