@@ -104,8 +104,8 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.fixture(scope="session")
 def shared() -> Path:
     """Give the folder with recorded data, which is not in the repository; skip if it is absent."""
-    beside = Path(__file__).resolve().parents[1].parent / "shared"
-    folder = Path(os.environ.get("FIRSTFIX_SHARED", beside))
+    sibling = Path(__file__).resolve().parents[1].parent / "shared"
+    folder = Path(os.environ.get("FIRSTFIX_SHARED", sibling))
     if not folder.is_dir():
         pytest.skip(f"no folder {folder}: set FIRSTFIX_SHARED to the one with the recorded data")
     return folder

@@ -111,7 +111,7 @@ def test_headings_are_averaged_on_the_circle(centre):
     np.testing.assert_allclose(cluster.covariance[:2], 0.0, atol=1e-15)
 
 
-def test_a_robot_that_knows_its_place_but_not_its_heading_is_at_one_place():
+def test_a_known_position_with_unknown_heading_is_one_place():
     yaw = (np.arange(HEADINGS) + 0.5) * BIN_RAD
     poses = np.column_stack([np.full(HEADINGS, 0.2), np.full(HEADINGS, 0.2), yaw])
     belief = equal_weights(poses)

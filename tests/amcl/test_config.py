@@ -58,7 +58,7 @@ def test_names_and_defaults_are_those_of_nav2():
 
 
 @pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.name)
-def test_every_setting_says_what_it_is(entry):
+def test_every_setting_has_a_description(entry):
     assert len(entry.metadata["description"]) > 10
     assert entry.metadata["least"] <= entry.metadata["most"]
 

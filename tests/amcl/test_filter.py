@@ -57,7 +57,7 @@ def test_after_every_step_there_is_a_belief(room, model, motion, never, observe,
 
 @pytest.mark.parametrize("model", SensorModel)
 @pytest.mark.parametrize("reading", [math.nan, math.inf, 0.0, 7.9])
-def test_scans_that_say_nothing_or_nonsense_leave_a_belief(
+def test_uninformative_and_invalid_scans_leave_a_belief(
     room, model, reading, fixed, assert_is_belief, inject_free
 ):
     config = fixed(100, laser_model_type=model, recovery_alpha_slow=0.01, recovery_alpha_fast=0.5)
@@ -69,7 +69,7 @@ def test_scans_that_say_nothing_or_nonsense_leave_a_belief(
 
 
 @pytest.mark.parametrize("reading", [math.nan, 0.0])
-def test_a_scan_that_says_nothing_changes_neither_weights_nor_history(room, reading, never, fixed):
+def test_an_uninformative_scan_changes_neither_weights_nor_history(room, reading, never, fixed):
     config = fixed(100, recovery_alpha_slow=0.01, recovery_alpha_fast=0.5, resample_interval=10)
     before = replace(
         start(

@@ -62,8 +62,8 @@ def test_a_scan_that_stops_fitting_brings_new_particles(
     rng = np.random.default_rng(1)
     sensor = build_sensor(room, config)
     after = step(before, SE2.identity(), scan, sensor, rng, config, inject)
-    ((told, n),) = asked
-    assert told is scan
+    ((given, n),) = asked
+    assert given is scan
     assert 0.1 * 200 < n < 200
     injected = (after.particles.poses() == marked).all(axis=1)
     assert injected.sum() == n
@@ -116,7 +116,7 @@ def test_injection_may_give_fewer_or_more_than_asked(
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_kidnapped_robot_is_found_where_the_injection_says(room, seed, fixed, observe, converged):
+def test_a_kidnapped_robot_is_found_at_the_injected_poses(room, seed, fixed, observe, converged):
     config = fixed(300, **ON)
     state, sensor = converged(room, config, seed), build_sensor(room, config)
     rng = np.random.default_rng(seed)

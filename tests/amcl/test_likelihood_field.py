@@ -333,7 +333,7 @@ def test_a_map_of_a_single_cell_is_a_map(wall):
     np.testing.assert_allclose(logs, expected, atol=used * UNIT)
 
 
-def test_a_scan_without_hits_says_nothing():
+def test_a_scan_without_hits_is_uninformative():
     for reading in (math.inf, math.nan):
         scan = LaserScan(np.full(40, reading, np.float32), -1.0, 0.05, 0.1, 8.0)
         for model in (SensorModel.LIKELIHOOD_FIELD, PROB):

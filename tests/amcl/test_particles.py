@@ -52,7 +52,7 @@ def test_evidence_between_the_least_of_numbers_still_counts():
 
 
 @pytest.mark.parametrize("nothing", [0.0, math.nan])
-def test_evidence_against_everything_says_nothing(nothing):
+def test_evidence_against_all_particles_changes_nothing(nothing):
     before = somewhere(5).reweighed(np.arange(5.0))
     assert before.reweighed(np.full(5, nothing)) is before
 

@@ -149,7 +149,7 @@ def test_where_nothing_is_in_reach_no_return_is_what_was_expected(room):
     assert logs[0] == pytest.approx(20 * math.log(0.5 + 0.05))
 
 
-def test_a_scan_without_valid_reading_says_nothing(room):
+def test_a_scan_without_valid_reading_is_uninformative(room):
     scan = LaserScan(np.full(20, math.nan, np.float32), -1.0, 0.1, 0.05, 5.0)
     logs, used = RayModel(room, BEAM).log_likelihood(somewhere(20), select_beams(scan, BEAM))
     assert used == 0

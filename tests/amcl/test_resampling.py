@@ -1,4 +1,4 @@
-"""Systematic resampling: as many copies as the weight says, never off by one or more."""
+"""Systematic resampling: copies in proportion to weight, never off by one or more."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ def test_fit_is_the_geometric_mean_over_the_belief():
     assert fit == pytest.approx((0.1 * 0.2 * 0.4 * 0.4) ** 0.25)
 
 
-def test_a_scan_that_says_nothing_leaves_all_equally_likely():
+def test_an_uninformative_scan_leaves_all_equally_likely():
     likelihood, fit = weigh(three(), beams_of(60), Told([0.0, 0.0, 0.0], 0))
     assert likelihood.tolist() == [1.0, 1.0, 1.0]
     assert math.isnan(fit)

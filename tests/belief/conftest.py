@@ -38,7 +38,7 @@ def halls() -> MapFields:
 
 @pytest.fixture(scope="session")
 def four_rooms() -> MapFields:
-    """Four rooms that no scan can tell apart."""
+    """Four rooms that no scan can distinguish."""
     return MapFields(identical_rooms(4))
 
 

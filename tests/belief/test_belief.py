@@ -1,4 +1,4 @@
-"""Several views, one belief: laws, the slow twin, and what must never be said."""
+"""Several views, one belief: laws, a slow reference, and answers that must never occur."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ START = SE2(10.5, 2.0, 1.8)
 TURN = [SE2(0.3, 0.0, -0.35)] * 10
 
 
-def told(views, fields, **options):
+def beliefs_of(views, fields, **options):
     belief = begin(fields, **options)
     beliefs = []
     for view in views:
@@ -44,11 +44,11 @@ def end_of(start, steps):
     return start
 
 
-# --- the right place, and when it may be said ---
+# --- the right place, and when it is UNIQUE ---
 
 
 def test_views_decide_together_what_one_view_leaves_open(halls, drive):
-    beliefs = told(drive(halls.grid, START, TURN), halls)
+    beliefs = beliefs_of(drive(halls.grid, START, TURN), halls)
     assert beliefs[0].verdict is Verdict.AMBIGUOUS
     assert beliefs[-1].verdict is Verdict.UNIQUE
     assert is_at(beliefs[-1].places[0].pose, end_of(START, TURN))
@@ -70,20 +70,20 @@ def test_one_scan_of_a_sensor_that_sees_much_may_decide(room, drive):
 
 def test_what_is_identical_stays_open(four_rooms, drive):
     start = SE2(*four_rooms.grid.to_map(np.array([60.0, 60.0])).tolist(), 0.5)
-    for belief in told(drive(four_rooms.grid, start, [SE2(0.0, 0.0, 0.5)] * 8), four_rooms):
+    for belief in beliefs_of(drive(four_rooms.grid, start, [SE2(0.0, 0.0, 0.5)] * 8), four_rooms):
         assert belief.verdict is not Verdict.UNIQUE
         assert belief.probabilities[0] < 0.6
 
 
 def test_a_published_place_stays_published_at_rest(halls, drive):
     views = drive(halls.grid, START, [*TURN, SE2(0.0, 0.0, 0.0), SE2(0.0, 0.0, 0.0)])
-    last = told(views, halls)[-3:]
+    last = beliefs_of(views, halls)[-3:]
     assert [belief.verdict for belief in last] == [Verdict.UNIQUE] * 3
     assert len({belief.places[0].id for belief in last}) == 1
 
 
 def test_a_wrong_map_is_never_published(halls, room, drive):
-    beliefs = told(drive(halls.grid, START, TURN, WIDE), room)
+    beliefs = beliefs_of(drive(halls.grid, START, TURN, WIDE), room)
     assert all(belief.verdict is not Verdict.UNIQUE for belief in beliefs)
 
 
@@ -91,13 +91,13 @@ def test_a_wrong_map_is_never_published(halls, room, drive):
 
 
 def test_mass_sums_to_one(halls, drive):
-    for belief in told(drive(halls.grid, START, TURN), halls):
+    for belief in beliefs_of(drive(halls.grid, START, TURN), halls):
         assert belief.probabilities.sum() + belief.elsewhere == pytest.approx(1.0)
         assert (np.diff(belief.probabilities) <= 0.0).all()
 
 
 def test_the_same_views_give_the_same_belief(halls, drive):
-    one, other = (told(drive(halls.grid, START, TURN[:4]), halls)[-1] for _ in range(2))
+    one, other = (beliefs_of(drive(halls.grid, START, TURN[:4]), halls)[-1] for _ in range(2))
     np.testing.assert_array_equal(one.poses, other.poses)
     np.testing.assert_array_equal(one.probabilities, other.probabilities)
     assert one.reason == other.reason
@@ -114,8 +114,8 @@ def test_nothing_changes_a_belief(halls, drive):
 
 def test_the_frame_of_the_odometry_does_not_matter(halls, drive):
     steps = TURN[:4]
-    one = told(drive(halls.grid, START, steps), halls)[-1]
-    other = told(drive(halls.grid, START, steps, odometry=SE2(30.0, -7.0, -2.0)), halls)[-1]
+    one = beliefs_of(drive(halls.grid, START, steps), halls)[-1]
+    other = beliefs_of(drive(halls.grid, START, steps, odometry=SE2(30.0, -7.0, -2.0)), halls)[-1]
     np.testing.assert_allclose(one.poses, other.poses, atol=1e-6)
     np.testing.assert_allclose(one.probabilities, other.probabilities, atol=1e-6)
 
@@ -125,7 +125,7 @@ def test_map_and_places_move_together(halls, drive):
     grid = halls.grid
     moved = OccupancyGrid(grid.cells, grid.resolution, move @ grid.T_map_grid)
     views = drive(grid, START, TURN[:4])
-    here, there = told(views, halls)[-1], told(views, MapFields(moved))[-1]
+    here, there = beliefs_of(views, halls)[-1], beliefs_of(views, MapFields(moved))[-1]
     np.testing.assert_allclose(here.probabilities, there.probabilities, atol=1e-9)
     for a, b in zip(here.places, there.places, strict=True):
         assert (move @ a.pose).distance_to(b.pose) < 1e-6
@@ -142,8 +142,8 @@ def test_two_sensors_in_any_order_are_one_view(halls, drive):
     pairs = list(
         zip(drive(halls.grid, START, TURN), drive(halls.grid, START, TURN, back), strict=True)
     )
-    one = told([View((*a.scans, *b.scans), a.T_odom_base) for a, b in pairs], halls)[-1]
-    other = told([View((*b.scans, *a.scans), a.T_odom_base) for a, b in pairs], halls)[-1]
+    one = beliefs_of([View((*a.scans, *b.scans), a.T_odom_base) for a, b in pairs], halls)[-1]
+    other = beliefs_of([View((*b.scans, *a.scans), a.T_odom_base) for a, b in pairs], halls)[-1]
     assert one.verdict is Verdict.UNIQUE
     np.testing.assert_allclose(one.probabilities, other.probabilities, atol=1e-9)
 
@@ -164,13 +164,13 @@ def test_prediction_moves_every_place(halls, drive):
 
 def test_odometry_that_slips_a_tenth_keeps_the_place(halls, drive):
     steps = [SE2(0.3, 0.0, -0.35)] * 10
-    belief = told(drive(halls.grid, START, steps, slip=0.9), halls)[-1]
+    belief = beliefs_of(drive(halls.grid, START, steps, slip=0.9), halls)[-1]
     assert belief.verdict is Verdict.UNIQUE
     assert is_at(belief.places[0].pose, end_of(START, steps))
 
 
 def test_ids_last_while_the_robot_moves(halls, drive):
-    beliefs = told(drive(halls.grid, START, TURN), halls)
+    beliefs = beliefs_of(drive(halls.grid, START, TURN), halls)
     final = beliefs[-1].places[0].id
     assert sum(final in belief.tracks.ids for belief in beliefs) >= len(beliefs) - 2
 
@@ -180,7 +180,7 @@ def test_a_robot_that_is_carried_away_is_found_again(halls, drive):
     last = views[-1].T_odom_base
     elsewhere = SE2(2.0, 1.5, 1.2)
     views += drive(halls.grid, elsewhere, TURN, WIDE, odometry=last @ SE2(0.3, 0.0, 0.0))
-    beliefs = told(views, halls)
+    beliefs = beliefs_of(views, halls)
     assert not any(is_at(b.places[0].pose, START, 1.0) for b in beliefs[-3:])
     assert beliefs[-1].verdict is Verdict.UNIQUE
     assert is_at(beliefs[-1].places[0].pose, end_of(elsewhere, TURN))
@@ -202,7 +202,7 @@ def test_news_is_motion(halls, drive, step, news):
     assert brings_news(belief, view.T_odom_base @ step) is news
 
 
-# --- what says nothing ---
+# --- views without information ---
 
 
 def test_a_blind_view_changes_nothing_but_the_prediction(halls, drive):
@@ -238,7 +238,7 @@ def test_evidence_overrules_a_hint(room, drive):
     assert is_at(belief.places[0].pose, truth)
 
 
-def test_few_places_are_held_when_told_so(halls, drive):
+def test_the_number_of_places_is_limited_by_the_config(halls, drive):
     (view,) = drive(halls.grid, START, [])
     belief = update(begin(halls, config=BeliefConfig(places=5)), view)
     assert len(belief.probabilities) <= 5

@@ -94,7 +94,7 @@ def test_the_method_of_the_paper_takes_one_scan(halls):
 # --- at rest ---
 
 
-def test_people_who_walk_are_told_from_walls():
+def test_walking_people_are_distinguished_from_walls():
     walls, person = [3.0, 3.0, 3.0, 3.0], 1.0
     scans = []
     for at in range(4):

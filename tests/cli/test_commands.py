@@ -32,8 +32,8 @@ def test_help_names_every_command(cli) -> None:
 )
 def test_help_names_the_default_of_what_may_be_left_out(cli, command: list[str], default: str):
     # The box breaks lines anywhere.
-    told = " ".join(cli(*command, "--help").out.replace("│", " ").split())
-    assert default in told
+    printed = " ".join(cli(*command, "--help").out.replace("│", " ").split())
+    assert default in printed
 
 
 def test_version(cli) -> None:
@@ -125,9 +125,9 @@ def test_map_check_of_a_map_with_nothing_in_it(cli, tmp_path: Path, grey: int, w
     ended = cli("map", "check", "blank.yaml")
     assert (ended.status, ended.err) == (0, "")
     assert "warning: " in ended.out
-    told = ended.out.splitlines()[-1]
-    assert told.startswith("Perceptual aliasing cannot be measured: ")
-    assert word in told
+    printed = ended.out.splitlines()[-1]
+    assert printed.startswith("Perceptual aliasing cannot be measured: ")
+    assert word in printed
 
 
 @pytest.mark.slow

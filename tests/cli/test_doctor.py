@@ -1,4 +1,4 @@
-"""What the doctor says of packages, caches, a map and ROS."""
+"""The report of the doctor: packages, caches, a map and ROS."""
 
 import importlib.metadata
 import sys
@@ -67,11 +67,11 @@ def test_a_master_that_does_not_answer(ros_line, uri: str) -> None:
 
 @pytest.mark.parametrize(("package", "extra"), [("matplotlib", "plot"), ("cyclonedds", "dds")])
 def test_extras_are_named(cli, package: str, extra: str) -> None:
-    said = line(cli("doctor"), package)
+    printed = line(cli("doctor"), package)
     try:
-        assert importlib.metadata.version(package) in said
+        assert importlib.metadata.version(package) in printed
     except importlib.metadata.PackageNotFoundError:
-        assert f"pip install 'firstfix[{extra}]'" in said
+        assert f"pip install 'firstfix[{extra}]'" in printed
 
 
 def test_every_package_that_is_needed_is_named() -> None:

@@ -60,9 +60,9 @@ def test_a_place_there_is_twice_ends_with_1_and_lists_both(cli, alike: Files) ->
     (x1, y1, yaw1), (x2, y2, yaw2) = (h["pose"] for h in answer["hypotheses"][:2])
     assert abs(x2 - x1) == pytest.approx(8.0, abs=0.05)
     assert (y1, yaw1) == pytest.approx((y2, yaw2), abs=0.05)
-    told = cli("locate", *alike)
-    assert told.status == 1
-    assert "| rank |" in told.out
+    printed = cli("locate", *alike)
+    assert printed.status == 1
+    assert "| rank |" in printed.out
 
 
 @pytest.mark.parametrize(

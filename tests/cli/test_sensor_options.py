@@ -1,4 +1,4 @@
-"""Options of ``locate`` and ``track`` that say what a log does not."""
+"""Options of ``locate`` and ``track`` that replace missing data of a log."""
 
 import json
 import math

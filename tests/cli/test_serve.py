@@ -55,17 +55,17 @@ def status(url: str, **headers: str) -> dict[str, Any]:
 
 def wait_for(url: str, state: str) -> dict[str, Any]:
     end = time.monotonic() + PATIENCE_S
-    while (told := status(url))["state"] != state:
-        assert time.monotonic() < end, told
+    while (answer := status(url))["state"] != state:
+        assert time.monotonic() < end, answer
         time.sleep(0.1)
-    return told
+    return answer
 
 
 @pytest.mark.slow
 def test_a_simulated_robot_is_served_until_ctrl_c() -> None:
     with running("serve", "house", "--port", 0) as (process, url):
-        told = wait_for(url, "LOCALIZED")
-        assert told["truth"] is not None
+        answer = wait_for(url, "LOCALIZED")
+        assert answer["truth"] is not None
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=PATIENCE_S)
         assert (process.returncode, out, err) == (0, "", "")

@@ -57,12 +57,12 @@ def files(drive: Path) -> tuple[Path, Path]:
 def test_a_drive_is_described_in_text(cli, files: tuple[Path, Path]) -> None:
     ended = cli("track", *files)
     assert ended.status == 0
-    told = f"\n{ended.out}"
+    printed = f"\n{ended.out}"
     for word in ("scans ", "drive ", "end ", "σ ", "elsewhere ", "particles ", "CPU ", "kept "):
-        assert f"\n{word}" in told
-    assert "\nAPE          RMSE 0.0" in told
-    assert "\nRPE          RMSE 0.0" in told
-    assert "100.0% of 66 scans within 0.5 m and 10° of the truth" in told
+        assert f"\n{word}" in printed
+    assert "\nAPE          RMSE 0.0" in printed
+    assert "\nRPE          RMSE 0.0" in printed
+    assert "100.0% of 66 scans within 0.5 m and 10° of the truth" in printed
     assert ended.err == "note: starting at the first true pose of the log\n"
 
 

@@ -107,7 +107,7 @@ WRONG: list[tuple[str, Callable[[ff.OccupancyGrid, ff.ScanMatcher], Any]]] = [
 
 
 @pytest.mark.parametrize(("remedy", "call"), WRONG)
-def test_a_wrong_argument_ends_in_a_sentence_that_says_what_to_pass(
+def test_the_error_of_a_wrong_argument_names_what_to_pass(
     remedy: str,
     call: Callable[[ff.OccupancyGrid, ff.ScanMatcher], Any],
     hall_plan: ff.OccupancyGrid,

@@ -1,4 +1,4 @@
-"""Errors say what was expected, what was received and what to do, also after pickling."""
+"""Errors state expected, received and remedy, also after pickling."""
 
 import pickle
 

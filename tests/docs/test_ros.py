@@ -41,7 +41,7 @@ def test_sentences_are_those_of_the_node() -> None:
         for part in words:
             # What stands at the ends is put in by the code.
             fixed = re.sub(r"^expected | (scan|map|events/cliff|odometry)$", "", part)
-            assert fixed in code, f"{sentence} is nowhere said"
+            assert fixed in code, f"{sentence} is in no source"
 
 
 def test_parameters_of_the_example_are_right() -> None:

@@ -77,7 +77,7 @@ def test_a_map_without_free_space_has_no_position():
 
 
 @pytest.mark.parametrize("resolution", [0.01, 0.02, 0.025, 0.05, 0.1, 0.2, 0.25])
-def test_positions_are_as_dense_as_the_spacing_says_whatever_the_cells(resolution):
+def test_positions_have_the_spacing_for_any_size_of_cells(resolution):
     stride = build_search_grid(OccupancyGrid(np.zeros((50, 50), np.int8), resolution)).stride
     assert stride == 1 or stride % 2 == 0
     assert abs(stride * resolution - SPACING_M) <= max(resolution, 0.05)

@@ -41,7 +41,7 @@ def test_each_kind_of_reading():
 
 
 @given(st.lists(readings, min_size=1, max_size=12), st.sampled_from([5.0, 40.0, INF]))
-def test_every_used_beam_says_how_far_it_is_free(ranges, range_max):
+def test_every_used_beam_has_a_free_range(ranges, range_max):
     scan = scan_of(*ranges, range_max=range_max)
     beams = usable_beams(scan)
     assert len(beams) == np.count_nonzero(scan.hit | scan.no_return)

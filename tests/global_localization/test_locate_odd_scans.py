@@ -31,7 +31,7 @@ SILENT = {
 
 @pytest.mark.parametrize("reading", SILENT.values(), ids=SILENT.keys())
 @pytest.mark.parametrize("method", Method)
-def test_a_scan_without_a_hit_matches_nothing_and_says_so(reading, method, draw_room):
+def test_a_scan_without_a_hit_is_no_match_with_a_reason(reading, method, draw_room):
     matcher = ScanMatcher(draw_room(0.25), method=method)
     scan = LaserScan(np.full(360, reading, np.float32), -np.pi, FULL_TURN / 360, 0.1, 12.0)
     result = matcher.locate(scan)

@@ -117,7 +117,7 @@ def test_anywhere_the_covariance_is_symmetric_and_positive(room):
     assert (np.linalg.eigvalsh(covariances) > 0.0).all()
 
 
-def test_the_true_pose_lies_where_the_covariance_says(room):
+def test_the_true_pose_is_within_the_covariance(room):
     """Mahalanobis distance within 3 sigma for at least 95 % of scans, and it is not pessimistic."""
     distances, sigmas = [], []
     for seed in range(60):

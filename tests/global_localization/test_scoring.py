@@ -191,7 +191,7 @@ def test_two_calls_agree_to_the_last_bit(hall):
 
 
 @pytest.mark.parametrize("value", [math.nan, 0.0])
-def test_a_blind_scan_says_neither_yes_nor_no(hall, value):
+def test_a_blind_scan_neither_confirms_nor_rejects(hall, value):
     truth = SE2(4.0, 3.0, 1.0)
     blind = dataclasses.replace(seen(hall, truth), ranges=np.full(180, value, np.float32))
     (place,) = score_poses(blind, [truth], hall)

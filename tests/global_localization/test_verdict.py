@@ -102,7 +102,7 @@ def test_ambiguous_alone():
 @pytest.mark.parametrize(
     ("evidence", "words"), [(THROUGH, "see through its walls"), (SHORT, "end elsewhere")]
 )
-def test_no_match_says_what_speaks_against_the_best_place(evidence, words):
+def test_the_reason_of_no_match_is_the_evidence_against_the_best_place(evidence, words):
     verdict, reason = judged([0.2, 0.1], evidence)
     assert verdict is Verdict.NO_MATCH
     assert words in reason

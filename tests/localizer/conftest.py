@@ -1,4 +1,4 @@
-"""A robot that stands or drives in a drawn world and tells a localizer what it sees."""
+"""A robot that stands or drives in a drawn world and sends its scans to a localizer."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ HALF_LIDAR = Lidar(beams=120, fov=math.pi)
 
 
 class Robot:
-    """One robot, its world, its localizer, and all that this has said.
+    """One robot, its world, its localizer, and all outputs.
 
-    Each `tick` is 0.1 s: the robot moves, its odometry is told, then its scan.
+    Each `tick` is 0.1 s: the robot moves and sends its odometry, then its scan.
     """
 
     def __init__(
@@ -55,14 +55,14 @@ class Robot:
         self.lidar = lidar or Lidar(beams=180)
         self.T_odom_base = SE2(-3.0, 7.0, 2.0)
         self.stamp = 100.0
-        self.said: list[Output] = []
+        self.outputs: list[Output] = []
         self._ticks = 0
         self._rng = np.random.default_rng(seed)
 
-    def tell(self, given: Input) -> list[Output]:
+    def send(self, given: Input) -> list[Output]:
         """Hand an input to the localizer."""
         outputs = self.localizer.handle(given)
-        self.said += outputs
+        self.outputs += outputs
         return outputs
 
     def scan(self) -> LaserScan:
@@ -74,11 +74,11 @@ class Robot:
         moved = moved or SE2.identity()
         self.skip(moved)
         scan = self.scan()
-        odometry = self.tell(Odometry(self.stamp, self.T_odom_base))
-        return odometry + self.tell(damage(scan) if damage else scan)
+        odometry = self.send(Odometry(self.stamp, self.T_odom_base))
+        return odometry + self.send(damage(scan) if damage else scan)
 
     def skip(self, moved: SE2) -> None:
-        """Let 0.1 s pass of which nobody hears."""
+        """Let 0.1 s pass without a message."""
         self.pass_time(0.1)
         self.pose = self.pose @ moved
         self.T_odom_base = self.T_odom_base @ moved
@@ -191,13 +191,13 @@ def poses(of: Callable[[Any, list[Output]], list[Any]]) -> Callable[[list[Output
 
 @pytest.fixture(scope="session")
 def kinds() -> Callable[[list[Output]], list[type]]:
-    """Give a function that tells of which kinds outputs are."""
+    """Return a function for the types of outputs."""
     return lambda outputs: [type(output) for output in outputs]
 
 
 @pytest.fixture(scope="session")
 def is_at() -> Callable[..., bool]:
-    """Give a function that tells whether a pose is as near to the truth as it should be."""
+    """Return a function that compares a pose with the truth."""
 
     def is_at(pose: SE2, truth: SE2, metres: float = 0.1, degrees: float = 2.0) -> bool:
         near = pose.distance_to(truth) <= metres

@@ -27,11 +27,11 @@ def room_of(place):
 
 
 def choose(robot, place):
-    return robot.tell(PoseHint(robot.stamp, place.pose, hypothesis_id=place.id))
+    return robot.send(PoseHint(robot.stamp, place.pose, hypothesis_id=place.id))
 
 
 def test_at_rest_places_keep_number_and_rank(resting, of):
-    lists = of(Hypotheses, resting.said)
+    lists = of(Hypotheses, resting.outputs)
     assert len(lists) >= 29
     assert len({tuple(place.id for place in output.places) for output in lists}) == 1
 
@@ -39,7 +39,7 @@ def test_at_rest_places_keep_number_and_rank(resting, of):
 def test_numbers_are_different_and_follow_the_place_when_the_robot_turns(resting, of):
     resting.ticks(60, A_TURN)
     rooms = {}
-    for output in of(Hypotheses, resting.said):
+    for output in of(Hypotheses, resting.outputs):
         assert len({place.id for place in output.places}) == len(output.places)
         for place in output.places[:3]:
             rooms.setdefault(place.id, set()).add(room_of(place))
@@ -49,7 +49,7 @@ def test_numbers_are_different_and_follow_the_place_when_the_robot_turns(resting
 
 @pytest.mark.parametrize("rank", range(3))
 def test_the_place_that_is_chosen_is_published_wherever_it_ranks(resting, of, rank):
-    place = of(Hypotheses, resting.said)[0].places[rank]
+    place = of(Hypotheses, resting.outputs)[0].places[rank]
     resting.ticks(60, A_TURN)
     choose(resting, place)
     assert resting.localizer.state is State.VERIFYING_HINT
@@ -58,8 +58,8 @@ def test_the_place_that_is_chosen_is_published_wherever_it_ranks(resting, of, ra
 
 
 def test_a_place_that_is_gone_is_refused_in_one_sentence(resting, of):
-    place = of(Hypotheses, resting.said)[-1].places[0]
-    resting.tell(Reset(resting.stamp))
+    place = of(Hypotheses, resting.outputs)[-1].places[0]
+    resting.send(Reset(resting.stamp))
     resting.tick()
     state = resting.localizer.state
     (status,) = choose(resting, place)
@@ -67,10 +67,10 @@ def test_a_place_that_is_gone_is_refused_in_one_sentence(resting, of):
     assert status.state is resting.localizer.state is state
 
 
-def test_a_choice_among_equal_places_says_who_chose_and_how_many_fit(resting, of):
-    last = of(Status, resting.said)[-1]
+def test_the_status_of_a_chosen_place_has_the_source_and_the_rivals(resting, of):
+    last = of(Status, resting.outputs)[-1]
     assert (last.rivals, last.chosen_by) == (3, None)
-    choose(resting, of(Hypotheses, resting.said)[-1].places[1])
+    choose(resting, of(Hypotheses, resting.outputs)[-1].places[1])
     for outputs in (resting.tick(), resting.tick(), resting.ticks(60, A_TURN)):
         status = of(Status, outputs)[-1]
         assert status.state is State.LOCALIZED
@@ -78,8 +78,8 @@ def test_a_choice_among_equal_places_says_who_chose_and_how_many_fit(resting, of
         assert status.reason == "chosen by a person; 3 places fit equally well"
 
 
-def test_a_pose_that_one_scan_decides_was_chosen_by_nobody(in_hall, of):
-    in_hall.tell(PoseHint(in_hall.stamp, in_hall.pose))
+def test_a_pose_that_one_scan_decides_has_no_chooser(in_hall, of):
+    in_hall.send(PoseHint(in_hall.stamp, in_hall.pose))
     (status,) = of(Status, in_hall.tick())
     assert (status.rivals, status.chosen_by) == (1, None)
 
@@ -90,11 +90,11 @@ def test_evidence_decides_for_or_against_the_choice(
 ):
     robot = robot_in(two_rooms, SE2(7.0, 0.0, 0.0) @ BEHIND, lidar=half_lidar)
     robot.tick()
-    robot.tell(PoseHint(robot.stamp, SE2(chosen_room, 0.0, 0.0) @ BEHIND, "the saved pose"))
+    robot.send(PoseHint(robot.stamp, SE2(chosen_room, 0.0, 0.0) @ BEHIND, "the saved pose"))
     (status,) = of(Status, robot.tick())
     assert status.chosen_by == "the saved pose"
     assert status.rivals == 2
     robot.ticks(63, A_TURN)
-    status = of(Status, robot.said)[-1]
+    status = of(Status, robot.outputs)[-1]
     assert (status.state, status.rivals, status.chosen_by) == (State.LOCALIZED, 1, None)
-    assert is_at(robot.said[-2].T_map_base, robot.pose, 0.3, 3.0)
+    assert is_at(robot.outputs[-2].T_map_base, robot.pose, 0.3, 3.0)

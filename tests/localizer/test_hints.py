@@ -1,4 +1,4 @@
-"""What somebody says of the place of a robot, and what the scans say to that."""
+"""Hints: a proposed pose, confirmed or rejected by scans."""
 
 from __future__ import annotations
 
@@ -21,33 +21,31 @@ def in_words(outputs):
     return [output.reason for output in outputs if isinstance(output, Status)]
 
 
-def test_who_said_it_is_in_the_status(robot_in, hall_plan):
+def test_the_source_of_a_hint_is_in_the_status(robot_in, hall_plan):
     robot = robot_in(hall_plan, SE2(4.0, 3.0, 1.0))
-    told = robot.tell(PoseHint(robot.stamp, robot.pose, "the saved pose"))
-    assert in_words(told) == ["the saved pose proposes a pose: the next scan will verify it"]
+    reported = robot.send(PoseHint(robot.stamp, robot.pose, "the saved pose"))
+    assert in_words(reported) == ["the saved pose proposes a pose: the next scan will verify it"]
     assert in_words(robot.tick())[0].startswith("the saved pose proposed this pose; ")
-    robot.tell(PoseHint(robot.stamp, SE2(1.0, 2.0, 2.0), "the saved pose"))
+    robot.send(PoseHint(robot.stamp, SE2(1.0, 2.0, 2.0), "the saved pose"))
     assert in_words(robot.tick()) == [
         "the pose proposed by the saved pose does not explain the scan: searching"
     ]
 
 
 @pytest.mark.parametrize("room", [*OTHERS, SE2.identity()])
-def test_in_equal_rooms_a_hint_is_believed_whichever_room_it_names(
-    robot_in, three_rooms, poses, room, is_at
-):
+def test_in_equal_rooms_a_hint_of_any_room_is_confirmed(robot_in, three_rooms, poses, room, is_at):
     """Nothing that the sensor sees could contradict it."""
     robot = robot_in(three_rooms, IN_ROOM_1)
-    robot.tell(PoseHint(robot.stamp, room @ IN_ROOM_1))
+    robot.send(PoseHint(robot.stamp, room @ IN_ROOM_1))
     assert is_at(poses(robot.tick())[0].T_map_base, room @ IN_ROOM_1)
 
 
 @pytest.mark.parametrize("ranges", [math.nan, 0.0, math.inf, [2.0] * 7 + [math.nan] * 173])
-def test_a_scan_that_says_nothing_is_no_proof_and_the_hint_waits(
+def test_an_uninformative_scan_leaves_the_hint_waiting(
     robot_in, three_rooms, with_ranges, poses, is_at, ranges
 ):
     robot = robot_in(three_rooms, IN_ROOM_1)
-    robot.tell(PoseHint(robot.stamp, IN_ROOM_1))
+    robot.send(PoseHint(robot.stamp, IN_ROOM_1))
     outputs = robot.ticks(3, damage=with_ranges(lambda scan: ranges))
     assert poses(outputs) == []
     assert (
@@ -65,7 +63,7 @@ def test_in_a_building_without_equals_a_wrong_hint_never_wins(
     robot = robot_in(office, office_poses(office, 1, 0)[0])
     for truth, wrong in zip(office_poses(office, 15, 1), office_poses(office, 15, 2), strict=True):
         robot.pose = truth
-        robot.tell(PoseHint(robot.stamp, wrong))
+        robot.send(PoseHint(robot.stamp, wrong))
         for pose in poses(robot.tick()):
             assert is_at(pose.T_map_base, truth, 0.2, 5.0)
 
@@ -76,7 +74,7 @@ def test_a_hint_that_is_a_little_off_is_put_right(robot_in, office, office_poses
     for truth in office_poses(office, 15, 4):
         robot.pose = truth
         off = SE2(*rng.uniform([-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]))
-        robot.tell(PoseHint(robot.stamp, truth @ off))
+        robot.send(PoseHint(robot.stamp, truth @ off))
         assert is_at(poses(robot.tick())[0].T_map_base, truth)
 
 
@@ -85,9 +83,9 @@ def test_a_hint_given_in_the_air_is_verified_after_the_robot_is_set_down(
 ):
     robot = robot_in(three_rooms, IN_ROOM_1)
     for active in (True, False):
-        robot.tell(Signal(robot.stamp, SignalKind.WHEEL_DROP, active=active))
+        robot.send(Signal(robot.stamp, SignalKind.WHEEL_DROP, active=active))
         if active:
-            robot.tell(PoseHint(robot.stamp, IN_ROOM_1))
+            robot.send(PoseHint(robot.stamp, IN_ROOM_1))
             assert robot.localizer.state is State.LIFTED
     assert robot.localizer.state is State.VERIFYING_HINT
     assert is_at(poses(robot.tick())[0].T_map_base, IN_ROOM_1)

@@ -1,4 +1,4 @@
-"""The system as whoever uses it sees it: inputs in, poses and reasons out."""
+"""The localizer as its users see it: inputs in, poses and reasons out."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ def test_a_drive_with_drifting_wheels_is_followed(robot_in, driven, hall_plan, o
     for scan, stamp, counted, truth in zip(
         driven.scans, odometry.stamps.tolist(), odometry.poses, driven.truth, strict=True
     ):
-        robot.tell(Odometry(stamp, SE2.from_array(counted)))
-        (tracked,) = of(TrackedPose, robot.tell(scan))
+        robot.send(Odometry(stamp, SE2.from_array(counted)))
+        (tracked,) = of(TrackedPose, robot.send(scan))
         assert is_at(tracked.T_map_base, SE2.from_array(truth), 0.1, 4.0)
-    assert len(of(InitialPose, robot.said)) == 1
+    assert len(of(InitialPose, robot.outputs)) == 1
 
 
 # ---- scans and odometry meet by their stamps
@@ -58,12 +58,12 @@ def test_a_drive_with_drifting_wheels_is_followed(robot_in, driven, hall_plan, o
 def test_a_scan_waits_until_odometry_reaches_it(in_hall, of, with_ranges):
     covered = with_ranges(lambda _: np.nan)  # leaves the pose to odometry
     in_hall.tick(damage=covered)
-    T_map_odom = of(TrackedPose, in_hall.said)[-1].T_map_odom
+    T_map_odom = of(TrackedPose, in_hall.outputs)[-1].T_map_odom
     in_hall.stamp += 0.1
     scan, T_odom_base = covered(in_hall.scan()), in_hall.T_odom_base
-    assert in_hall.tell(scan) == []
-    assert in_hall.tell(Odometry(scan.stamp - 0.02, T_odom_base)) == []
-    outputs = in_hall.tell(Odometry(scan.stamp + 0.02, T_odom_base @ SE2(0.2, 0.0, 0.0)))
+    assert in_hall.send(scan) == []
+    assert in_hall.send(Odometry(scan.stamp - 0.02, T_odom_base)) == []
+    outputs = in_hall.send(Odometry(scan.stamp + 0.02, T_odom_base @ SE2(0.2, 0.0, 0.0)))
     (tracked,) = of(TrackedPose, outputs)
     assert tracked.stamp == scan.stamp
     # Half the way: at the time of the scan, not of the message.
@@ -71,9 +71,9 @@ def test_a_scan_waits_until_odometry_reaches_it(in_hall, of, with_ranges):
     assert tracked.T_map_base.distance_to(expected) < 1e-6
 
 
-def test_before_any_odometry_nothing_is_said(robot_in, hall_plan):
+def test_without_odometry_there_is_no_output(robot_in, hall_plan):
     robot = robot_in(hall_plan, HERE)
-    assert robot.tell(robot.scan()) == []
+    assert robot.send(robot.scan()) == []
     assert robot.localizer.state is State.SEARCHING
 
 
@@ -82,16 +82,16 @@ def test_of_the_scans_that_wait_the_newest_wins(in_hall, of):
     for _ in range(3):
         in_hall.stamp += 0.1
         waiting.append(in_hall.scan())
-        assert in_hall.tell(waiting[-1]) == []
-    outputs = in_hall.tell(Odometry(in_hall.stamp, in_hall.T_odom_base))
+        assert in_hall.send(waiting[-1]) == []
+    outputs = in_hall.send(Odometry(in_hall.stamp, in_hall.T_odom_base))
     assert [tracked.stamp for tracked in of(TrackedPose, outputs)] == [waiting[-1].stamp]
     later = Odometry(in_hall.stamp + 1.0, in_hall.T_odom_base)
-    assert in_hall.tell(later) == []  # the others are gone
+    assert in_hall.send(later) == []  # the others are gone
 
 
-def test_a_scan_older_than_all_odometry_is_left_out_and_that_is_said(in_hall):
+def test_a_scan_older_than_all_odometry_is_skipped_and_reported(in_hall):
     old = dataclasses.replace(in_hall.scan(), stamp=50.0)
-    (status,) = in_hall.tell(old)
+    (status,) = in_hall.send(old)
     assert "older" in status.reason
     assert "left out" in status.reason
     assert status.stamp == 50.0
@@ -101,21 +101,21 @@ def test_a_scan_older_than_all_odometry_is_left_out_and_that_is_said(in_hall):
 # ---- several places
 
 
-def test_twins_are_told_and_none_is_published(robot_in, three_rooms, of, kinds, poses):
+def test_identical_places_are_listed_and_none_is_published(robot_in, three_rooms, of, kinds, poses):
     robot = robot_in(three_rooms, IN_A_ROOM)
     outputs = robot.tick()
     assert kinds(outputs) == [Hypotheses, Status]  # no motion inside would help
     (status,) = of(Status, outputs)
-    said = "3 places look identical to this sensor; no motion of up to 3 m would decide"
-    assert status.reason == said
+    reported = "3 places look identical to this sensor; no motion of up to 3 m would decide"
+    assert status.reason == reported
     assert robot.localizer.state is State.DISAMBIGUATING
     rooms = [place.pose.x - IN_A_ROOM.x for place in outputs[0].places if place.probability > 0.1]
     assert sorted(round(x) for x in rooms) == [-8, 0, 8]
     assert sum(place.probability for place in outputs[0].places) == pytest.approx(1.0, abs=0.05)
     robot.ticks(30)
     robot.ticks(120, A_TURN)
-    assert poses(robot.said) == []
-    (*_, last) = of(Hypotheses, robot.said)
+    assert poses(robot.outputs) == []
+    (*_, last) = of(Hypotheses, robot.outputs)
     shares = [place.probability for place in last.places[:3]]
     assert min(shares) > 0.1
     assert sum(shares) == pytest.approx(1.0, abs=0.05)
@@ -131,14 +131,14 @@ def test_the_motion_that_is_asked_for_decides(
     assert kinds(outputs) == [Hypotheses, Status, MotionRequest]
     motion = outputs[-1]
     robot.ticks(10)
-    assert poses(robot.said) == []
+    assert poses(robot.outputs) == []
     robot.ticks(20, SE2(0.0, 0.0, motion.turn / 20))
     robot.ticks(20, SE2(motion.ahead / 20, 0.0, 0.0))
     robot.ticks(20, SE2(0.0, 0.0, motion.turn / 20))
-    (found,) = of(InitialPose, robot.said)
+    (found,) = of(InitialPose, robot.outputs)
     assert robot.localizer.state is State.LOCALIZED
     assert all(
-        is_at(tracked.T_map_base, robot.pose) for tracked in of(TrackedPose, robot.said)[-1:]
+        is_at(tracked.T_map_base, robot.pose) for tracked in of(TrackedPose, robot.outputs)[-1:]
     )
     assert abs(found.T_map_base.x - room - BEHIND.x) < 1.5
 
@@ -149,12 +149,12 @@ def test_the_motion_that_is_asked_for_decides(
 def test_a_wrong_map_is_searched_once_a_second_at_rest(foreign, searches, of, kinds):
     robot = foreign
     searches.clear()
-    before = len(robot.said)
+    before = len(robot.outputs)
     robot.ticks(30)
     assert np.diff(searches).min() > 0.99
     assert len(searches) == 3
-    assert kinds(robot.said[before:]) == [Status] * 3
-    for status in of(Status, robot.said):
+    assert kinds(robot.outputs[before:]) == [Status] * 3
+    for status in of(Status, robot.outputs):
         assert status.state is State.SEARCHING
         assert "no place of the map explains" in status.reason
         assert status.evidence.explained < 0.8

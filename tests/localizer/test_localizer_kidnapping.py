@@ -21,13 +21,13 @@ A_STEP, A_TURN = SE2(0.05, 0.0, 0.05), SE2(0.0, 0.0, 0.1)
 
 @pytest.mark.parametrize("kind", [SignalKind.WHEEL_DROP, SignalKind.PICKED_UP, SignalKind.CLIFF])
 def test_a_lifted_robot_publishes_nothing_until_it_is_set_down(in_hall, kind, kinds, is_at):
-    (status,) = in_hall.tell(Signal(in_hall.stamp, kind, active=True))
+    (status,) = in_hall.send(Signal(in_hall.stamp, kind, active=True))
     assert status.state is State.LIFTED
     assert kind.value in status.reason
     assert in_hall.localizer.particles is None
     in_hall.pose = THERE
     assert in_hall.ticks(20) == []
-    (status,) = in_hall.tell(Signal(in_hall.stamp, kind, active=False))
+    (status,) = in_hall.send(Signal(in_hall.stamp, kind, active=False))
     assert status.state is State.SEARCHING
     outputs = in_hall.tick()
     assert kinds(outputs) == [InitialPose, TrackedPose, Status]
@@ -36,43 +36,43 @@ def test_a_lifted_robot_publishes_nothing_until_it_is_set_down(in_hall, kind, ki
 
 def test_a_robot_is_set_down_when_the_last_of_its_sensors_is_released(in_hall, kinds):
     for kind in (SignalKind.CLIFF, SignalKind.WHEEL_DROP):
-        in_hall.tell(Signal(in_hall.stamp, kind, active=True))
-    in_hall.tell(Signal(in_hall.stamp, SignalKind.CLIFF, active=False))
+        in_hall.send(Signal(in_hall.stamp, kind, active=True))
+    in_hall.send(Signal(in_hall.stamp, SignalKind.CLIFF, active=False))
     assert in_hall.ticks(3) == []
-    in_hall.tell(Signal(in_hall.stamp, SignalKind.WHEEL_DROP, active=False))
+    in_hall.send(Signal(in_hall.stamp, SignalKind.WHEEL_DROP, active=False))
     assert InitialPose in kinds(in_hall.tick())
 
 
 def test_a_bumper_is_no_kidnapping(in_hall, kinds):
     for active in (True, False):
-        assert in_hall.tell(Signal(in_hall.stamp, SignalKind.BUMPER, active=active)) == []
+        assert in_hall.send(Signal(in_hall.stamp, SignalKind.BUMPER, active=active)) == []
         assert kinds(in_hall.tick()) == [TrackedPose, Status]
 
 
 def test_a_robot_in_the_air_is_not_searched_for_when_its_map_arrives(hall_plan, robot_in, poses):
     robot = robot_in(hall_plan, HERE)
     robot.localizer = Localizer()
-    robot.tell(Signal(99.0, SignalKind.WHEEL_DROP, active=True))
-    robot.tell(NewMap(99.5, hall_plan))
+    robot.send(Signal(99.0, SignalKind.WHEEL_DROP, active=True))
+    robot.send(NewMap(99.5, hall_plan))
     assert robot.localizer.state is State.LIFTED
     assert poses(robot.ticks(3)) == []
-    robot.tell(Signal(robot.stamp, SignalKind.WHEEL_DROP, active=False))
+    robot.send(Signal(robot.stamp, SignalKind.WHEEL_DROP, active=False))
     assert poses(robot.tick()) != []
 
 
 def test_a_scan_from_the_hands_is_not_used_after_the_robot_is_set_down(in_hall, poses):
-    in_hall.tell(Signal(in_hall.stamp, SignalKind.WHEEL_DROP, active=True))
+    in_hall.send(Signal(in_hall.stamp, SignalKind.WHEEL_DROP, active=True))
     in_hall.stamp += 0.1
-    assert in_hall.tell(in_hall.scan()) == []
-    in_hall.tell(Signal(in_hall.stamp + 0.01, SignalKind.WHEEL_DROP, active=False))
-    assert poses(in_hall.tell(Odometry(in_hall.stamp + 0.02, in_hall.T_odom_base))) == []
+    assert in_hall.send(in_hall.scan()) == []
+    in_hall.send(Signal(in_hall.stamp + 0.01, SignalKind.WHEEL_DROP, active=False))
+    assert poses(in_hall.send(Odometry(in_hall.stamp + 0.02, in_hall.T_odom_base))) == []
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_a_silent_kidnapping_is_noticed_and_no_wrong_pose_is_published(
     robot_in, office, seed, of, is_at, office_poses
 ):
-    """Odometry is continuous, no signal: the scans alone tell."""
+    """Odometry is continuous and there is no signal: only scans reveal it."""
     start, goal = office_poses(office, 2, 100 + seed)
     assert start.distance_to(goal) > 1.0
     robot = robot_in(office, start, seed=seed)
@@ -85,7 +85,7 @@ def test_a_silent_kidnapping_is_noticed_and_no_wrong_pose_is_published(
     assert is_at(found.T_map_base, goal @ moved)
     later = [tracked for tracked in of(TrackedPose, outputs) if tracked.stamp >= found.stamp]
     assert all(tracked.T_map_base.distance_to(goal) < 0.1 for tracked in later)
-    for status in of(Status, outputs):  # before that nobody claims that all is well
+    for status in of(Status, outputs):  # no LOCALIZED status before that
         if status.stamp < found.stamp:
             assert "doubtful" in status.reason
 

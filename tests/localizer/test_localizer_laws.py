@@ -1,4 +1,4 @@
-"""What holds for any story: it repeats, what was said stays said, only the table changes states."""
+"""Laws for any sequence of inputs: reproducible, outputs immutable, states by the table."""
 
 from __future__ import annotations
 
@@ -56,16 +56,16 @@ def test_the_same_inputs_give_the_same_outputs(maps_cache, story, of):
     assert bits(first) == bits(second)
 
 
-def test_what_was_said_stays_said(maps_cache, story):
+def test_outputs_do_not_change_later(maps_cache, story):
     """No output is changed afterwards, and no input ever."""
     given = [event for event in story if isinstance(event, LaserScan)]
     before = [scan.ranges.tobytes() for scan in given]
-    localizer, said, copies = Localizer(cache_dir=maps_cache), [], []
+    localizer, reported, copies = Localizer(cache_dir=maps_cache), [], []
     for event in story:
         outputs = localizer.handle(event)
-        said += outputs
+        reported += outputs
         copies += copy.deepcopy(outputs)
-    assert bits(said) == bits(copies)
+    assert bits(reported) == bits(copies)
     assert [scan.ranges.tobytes() for scan in given] == before
 
 
@@ -97,7 +97,7 @@ def test_move_map_and_robot_together_and_nothing_else_changes(robot_in, hall_pla
     here, there = robot_in(hall_plan, HERE), robot_in(moved, by @ HERE)
     for robot in (here, there):
         robot.ticks(4, A_STEP)
-    a, b = poses(here.said), poses(there.said)
-    assert kinds(here.said) == kinds(there.said)
+    a, b = poses(here.outputs), poses(there.outputs)
+    assert kinds(here.outputs) == kinds(there.outputs)
     for one, other in zip(a, b, strict=True):
         assert (by @ one.T_map_base).distance_to(other.T_map_base) < 0.1

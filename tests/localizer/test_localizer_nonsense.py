@@ -26,7 +26,7 @@ A_STEP, A_TURN = SE2(0.05, 0.0, 0.05), SE2(0.0, 0.0, 0.1)
 def test_people_are_no_kidnapping(
     robot_in, office, with_ranges, together, kinds, is_at, office_poses
 ):
-    """A minute in which a third of the beams ends at somebody who is not in the map."""
+    """A minute in which a third of the beams ends at people."""
     rng = np.random.default_rng(0)
 
     def crowd(scan):
@@ -54,17 +54,17 @@ def test_a_blocked_sensor_leads_nowhere_wrong(in_hall, with_ranges, value, of, p
     # When it is clear again the robot is found, at the latest when it moves on.
     in_hall.ticks(40, A_TURN)
     assert in_hall.localizer.state is State.LOCALIZED
-    for pose in poses(in_hall.said):
+    for pose in poses(in_hall.outputs):
         assert pose.T_map_base.distance_to(HERE) < 0.1
 
 
-def test_a_hand_over_the_sensor_at_the_start_is_forgotten_when_it_is_gone(
+def test_a_covered_sensor_at_the_start_has_no_later_effect(
     robot_in, office, with_ranges, poses, office_poses
 ):
     rng = np.random.default_rng(0)
     robot = robot_in(office, office_poses(office, 1, 1)[0])
     robot.ticks(5, None, with_ranges(lambda scan: rng.uniform(0.12, 0.3, len(scan))))
-    assert poses(robot.said) == []
+    assert poses(robot.outputs) == []
     robot.ticks(100)
     assert robot.localizer.state is State.LOCALIZED
 
@@ -106,16 +106,16 @@ def back(step: SE2, times: int) -> SE2:
 
 
 @pytest.mark.parametrize("restart", [SE2(0.4, 0.2, 0.0), SE2(-1.0, 6.0, -2.0)])
-def test_a_base_that_drove_on_before_it_was_heard_again_publishes_no_wrong_pose(
+def test_a_base_that_drove_before_its_next_message_causes_no_wrong_pose(
     in_hall, restart, poses, of
 ):
     in_hall.ticks(10, A_STEP)
-    in_hall.T_odom_base = restart  # no longer at its start: nothing tells of the new frame
+    in_hall.T_odom_base = restart  # no longer at its start: no message reports the new frame
     in_hall.pass_time(5.0)
     outputs = in_hall.ticks(30, A_STEP)
-    told = poses(outputs)
-    assert len(told) > 20
-    for pose in told:
+    reported = poses(outputs)
+    assert len(reported) > 20
+    for pose in reported:
         ticks_since = round((in_hall.stamp - pose.stamp) / 0.1)
         true = in_hall.pose @ back(A_STEP, ticks_since)
         assert pose.T_map_base.distance_to(true) < 0.3
@@ -135,8 +135,8 @@ def test_a_clock_that_goes_back_changes_no_pose(in_hall, kinds, is_at):
     in_hall.ticks(5, A_STEP)
     for k in range(5):
         stamp = 3.0 + 0.1 * k
-        in_hall.tell(Odometry(stamp, in_hall.T_odom_base))
-        outputs = in_hall.tell(dataclasses.replace(in_hall.scan(), stamp=stamp))
+        in_hall.send(Odometry(stamp, in_hall.T_odom_base))
+        outputs = in_hall.send(dataclasses.replace(in_hall.scan(), stamp=stamp))
         assert kinds(outputs) == [TrackedPose, Status]
         assert outputs[0].stamp == stamp
         assert is_at(outputs[0].T_map_base, in_hall.pose)
@@ -147,16 +147,14 @@ def test_a_clock_that_goes_back_changes_no_pose(in_hall, kinds, is_at):
 
 @pytest.mark.parametrize("beams", [1, 7, 8])
 @pytest.mark.parametrize("value", [1.0, math.nan, math.inf, -math.inf, -1.0, 1e30])
-def test_scans_that_say_next_to_nothing_do_no_harm(
-    robot_in, hall_plan, beams, value, of, poses, is_at
-):
+def test_nearly_uninformative_scans_do_no_harm(robot_in, hall_plan, beams, value, of, poses, is_at):
     robot = robot_in(hall_plan, HERE)
     ranges = np.full(beams, value, np.float32)
     for k in range(5):
-        robot.tell(Odometry(float(k), SE2.identity()))
-        robot.tell(LaserScan(ranges, 0.0, 0.5, 0.1, 12.0, stamp=float(k)))
-    assert poses(robot.said) == []
-    outputs = robot.ticks(30, A_TURN)  # and they are forgotten
+        robot.send(Odometry(float(k), SE2.identity()))
+        robot.send(LaserScan(ranges, 0.0, 0.5, 0.1, 12.0, stamp=float(k)))
+    assert poses(robot.outputs) == []
+    outputs = robot.ticks(30, A_TURN)  # and they are discarded
     assert robot.localizer.state is State.LOCALIZED
     assert is_at(of(TrackedPose, outputs)[-1].T_map_base, robot.pose)
 
@@ -164,15 +162,15 @@ def test_scans_that_say_next_to_nothing_do_no_harm(
 def test_stamps_that_go_back_and_forth_do_no_harm(in_hall, poses, is_at):
     rng = np.random.default_rng(0)
     for stamp in rng.uniform(-1e9, 1e9, 30).tolist():
-        in_hall.tell(Odometry(stamp, in_hall.T_odom_base))
-        in_hall.tell(dataclasses.replace(in_hall.scan(), stamp=stamp + rng.uniform(-1.0, 1.0)))
-    assert all(is_at(pose.T_map_base, HERE) for pose in poses(in_hall.said))
+        in_hall.send(Odometry(stamp, in_hall.T_odom_base))
+        in_hall.send(dataclasses.replace(in_hall.scan(), stamp=stamp + rng.uniform(-1.0, 1.0)))
+    assert all(is_at(pose.T_map_base, HERE) for pose in poses(in_hall.outputs))
 
 
 @pytest.mark.parametrize("stamp", [-1e300, 1e18, 1e300])
 def test_huge_stamps_do_no_harm(in_hall, stamp, kinds, is_at):
-    in_hall.tell(Odometry(stamp, in_hall.T_odom_base))
-    outputs = in_hall.tell(dataclasses.replace(in_hall.scan(), stamp=stamp))
+    in_hall.send(Odometry(stamp, in_hall.T_odom_base))
+    outputs = in_hall.send(dataclasses.replace(in_hall.scan(), stamp=stamp))
     assert kinds(outputs) == [TrackedPose, Status]
     assert is_at(outputs[0].T_map_base, HERE)
 
@@ -186,7 +184,7 @@ def test_odometry_at_the_end_of_the_world_does_no_harm(in_hall, poses, is_at):
 
 def test_signals_without_end_do_no_harm(in_hall, kinds):
     for k in range(500):
-        in_hall.tell(Signal(in_hall.stamp + 1e-4 * k, SignalKind.CLIFF, active=True))
+        in_hall.send(Signal(in_hall.stamp + 1e-4 * k, SignalKind.CLIFF, active=True))
     assert in_hall.ticks(2) == []
-    in_hall.tell(Signal(in_hall.stamp, SignalKind.CLIFF, active=False))
+    in_hall.send(Signal(in_hall.stamp, SignalKind.CLIFF, active=False))
     assert InitialPose in kinds(in_hall.tick())

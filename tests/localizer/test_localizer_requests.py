@@ -20,7 +20,7 @@ IN_A_ROOM = SE2(10.5, 1.2, 0.3)
 A_TURN = SE2(0.0, 0.0, 0.1)
 
 
-def test_without_a_map_nothing_is_done_and_that_is_said(hall_plan):
+def test_inputs_without_a_map_are_ignored_and_reported(hall_plan):
     localizer = Localizer()
     assert localizer.handle(Odometry(1.0, SE2.identity())) == []
     scan = Lidar(beams=60).scan(hall_plan, HERE, np.random.default_rng(0), 1.0)
@@ -34,12 +34,12 @@ def test_without_a_map_nothing_is_done_and_that_is_said(hall_plan):
 def test_a_new_map_ends_all_that_was(in_hall, office, kinds, is_at, office_poses):
     in_hall.stamp += 0.1
     waiting = in_hall.scan()
-    in_hall.tell(waiting)
-    (status,) = in_hall.tell(NewMap(in_hall.stamp, office))
+    in_hall.send(waiting)
+    (status,) = in_hall.send(NewMap(in_hall.stamp, office))
     assert status.state is State.SEARCHING
     assert in_hall.localizer.particles is None
     # What waited belongs to the floor before.
-    assert in_hall.tell(Odometry(in_hall.stamp + 0.01, in_hall.T_odom_base)) == []
+    assert in_hall.send(Odometry(in_hall.stamp + 0.01, in_hall.T_odom_base)) == []
     (pose,) = office_poses(office, 1, 0)
     in_hall.world, in_hall.pose = office, pose
     outputs = in_hall.tick()
@@ -50,28 +50,28 @@ def test_a_new_map_ends_all_that_was(in_hall, office, kinds, is_at, office_poses
 def test_a_map_that_cannot_be_searched_changes_nothing(in_hall, kinds):
     empty = OccupancyGrid(np.full((50, 50), FREE, np.int8), 0.05)
     with pytest.raises(MapError):
-        in_hall.tell(NewMap(in_hall.stamp, empty))
+        in_hall.send(NewMap(in_hall.stamp, empty))
     assert in_hall.localizer.state is State.LOCALIZED
     assert kinds(in_hall.tick()) == [TrackedPose, Status]
 
 
-@pytest.mark.parametrize("told", ["map", "reset", "lifted", "update"])
-def test_after_news_the_next_scan_is_searched_at_once(foreign, office, told):
+@pytest.mark.parametrize("reported", ["map", "reset", "lifted", "update"])
+def test_after_news_the_next_scan_is_searched_at_once(foreign, office, reported):
     robot = foreign
-    if told == "map":
-        robot.tell(NewMap(robot.stamp, office))
-    elif told == "reset":
-        robot.tell(Reset(robot.stamp))
-    elif told == "lifted":
+    if reported == "map":
+        robot.send(NewMap(robot.stamp, office))
+    elif reported == "reset":
+        robot.send(Reset(robot.stamp))
+    elif reported == "lifted":
         for active in (True, False):
-            robot.tell(Signal(robot.stamp, SignalKind.PICKED_UP, active=active))
+            robot.send(Signal(robot.stamp, SignalKind.PICKED_UP, active=active))
     else:
-        robot.tell(NoMotionUpdate(robot.stamp))
+        robot.send(NoMotionUpdate(robot.stamp))
     assert robot.tick() != []
 
 
-def test_a_reset_forgets_and_searches(in_hall, kinds):
-    (status,) = in_hall.tell(Reset(in_hall.stamp))
+def test_a_reset_discards_the_pose_and_searches(in_hall, kinds):
+    (status,) = in_hall.send(Reset(in_hall.stamp))
     assert status.state is State.SEARCHING
     assert in_hall.localizer.particles is None
     assert kinds(in_hall.tick()) == [InitialPose, TrackedPose, Status]
@@ -82,7 +82,7 @@ def test_an_update_can_be_asked_for_at_rest(in_hall):
     before = in_hall.localizer.particles
     in_hall.tick()
     assert in_hall.localizer.particles is before
-    (status,) = in_hall.tell(NoMotionUpdate(in_hall.stamp))
+    (status,) = in_hall.send(NoMotionUpdate(in_hall.stamp))
     assert status.state is State.LOCALIZED
     in_hall.tick()
     once = in_hall.localizer.particles
@@ -92,10 +92,10 @@ def test_an_update_can_be_asked_for_at_rest(in_hall):
 
 
 def test_a_right_hint_decides_between_twins(robot_in, three_rooms, kinds, is_at):
-    """What no scan can tell, a person can."""
+    """A person decides between identical rooms."""
     robot = robot_in(three_rooms, IN_A_ROOM)
     robot.tick()
-    robot.tell(PoseHint(robot.stamp, IN_A_ROOM @ SE2(0.4, -0.3, 0.3)))
+    robot.send(PoseHint(robot.stamp, IN_A_ROOM @ SE2(0.4, -0.3, 0.3)))
     outputs = robot.tick()
     assert kinds(outputs) == [InitialPose, TrackedPose, Status]
     assert is_at(outputs[0].T_map_base, IN_A_ROOM)
@@ -105,7 +105,7 @@ def test_a_right_hint_decides_between_twins(robot_in, three_rooms, kinds, is_at)
 
 def test_a_hint_may_come_before_odometry(robot_in, hall_plan, of, is_at):
     robot = robot_in(hall_plan, HERE)
-    (status,) = robot.tell(PoseHint(robot.stamp, HERE @ SE2(0.3, 0.3, 0.3)))
+    (status,) = robot.send(PoseHint(robot.stamp, HERE @ SE2(0.3, 0.3, 0.3)))
     assert status.state is State.VERIFYING_HINT
     outputs = robot.tick()
     assert is_at(of(InitialPose, outputs)[0].T_map_base, HERE)
@@ -113,7 +113,7 @@ def test_a_hint_may_come_before_odometry(robot_in, hall_plan, of, is_at):
 
 @pytest.mark.parametrize("hint", [SE2(1.0, 2.0, 2.0), SE2(8.0, 6.0, 0.0)])
 def test_a_wrong_hint_costs_one_scan(in_hall, hint, kinds, is_at):
-    in_hall.tell(PoseHint(in_hall.stamp, hint))
+    in_hall.send(PoseHint(in_hall.stamp, hint))
     (status,) = in_hall.tick()
     assert status.state is State.SEARCHING
     assert "does not explain the scan" in status.reason
@@ -124,7 +124,7 @@ def test_a_wrong_hint_costs_one_scan(in_hall, hint, kinds, is_at):
 
 @pytest.mark.parametrize("hint", [SE2(900.0, 0.0, 0.0), SE2(-2.0, -2.0, 0.0)])
 def test_a_hint_outside_the_map_is_refused_and_nothing_is_lost(in_hall, hint, kinds):
-    (status,) = in_hall.tell(PoseHint(in_hall.stamp, hint))
+    (status,) = in_hall.send(PoseHint(in_hall.stamp, hint))
     assert status.state is State.LOCALIZED
     assert status.reason.startswith("hint of a person refused: expected a prior on the map")
     assert kinds(in_hall.tick()) == [TrackedPose, Status]
@@ -144,6 +144,6 @@ def test_a_wrong_hint_is_not_followed_where_the_scan_is_sure_of_another_place(
     """About three quarters of the beams fit near the hint; all of them fit elsewhere."""
     robot = robot_in(office, truth)
     assert is_at(of(InitialPose, robot.tick())[0].T_map_base, truth)  # UNIQUE
-    robot.tell(PoseHint(robot.stamp, hint))
+    robot.send(PoseHint(robot.stamp, hint))
     for pose in poses(robot.ticks(2)):
         assert is_at(pose.T_map_base, truth)

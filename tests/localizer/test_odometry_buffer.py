@@ -36,7 +36,7 @@ def ramp(stamp: float) -> SE2:
     return SE2(0.1 * stamp, -0.05 * stamp, 0.02 * stamp)
 
 
-def test_an_empty_one_knows_nothing() -> None:
+def test_an_empty_buffer_has_no_odometry() -> None:
     buffer = OdometryBuffer()
     assert buffer.last is None
     assert buffer.at(0.0) is None
@@ -82,7 +82,7 @@ def test_across_pi_it_turns_the_short_way(sign: float) -> None:
         assert angle_error(pose.yaw, expected) < 1e-12
 
 
-def test_outside_of_what_it_has_heard_it_knows_nothing() -> None:
+def test_there_is_no_odometry_outside_the_received_times() -> None:
     buffer = filled((1.0, ramp(1.0)), (2.0, ramp(2.0)))
     assert buffer.at(1.0) == ramp(1.0)
     assert buffer.at(2.0) == ramp(2.0)
@@ -176,7 +176,7 @@ def test_a_robot_that_drives_by_where_it_started_has_not_begun_anew() -> None:
         (SE2(0.0, 0.51, 0.0), 10.0, True),
         (SE2(0.0, 0.0, -0.53), 10.0, True),
         (SE2(0.0, 0.51, 0.0), 0.3001, True),
-        (SE2(0.0, 0.51, 0.0), 0.2999, False),  # a fast robot, heard as often as before
+        (SE2(0.0, 0.51, 0.0), 0.2999, False),  # a fast robot, at the same rate of messages
     ],
 )
 def test_a_long_step_after_a_silence_is_a_leap(

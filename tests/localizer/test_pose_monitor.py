@@ -83,7 +83,7 @@ def test_two_scans_that_disagree_do_not_move_the_pose(monitor, seen):
 
 
 def test_two_scans_that_disagree_with_odometry_do_not_move_the_pose(monitor, seen):
-    """The same place twice, although the robot says that it has driven 1 m."""
+    """The same place twice, although odometry has moved by 1 m."""
     assert monitor.judge(seen(THERE, 0.0), ODOM, HERE).fit is Fit.DOUBTFUL
     moved = SE2(1.0, 0.0, 0.0)
     assert monitor.judge(seen(THERE, 0.3), ODOM @ moved, HERE @ moved).fit is Fit.DOUBTFUL

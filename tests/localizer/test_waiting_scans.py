@@ -22,9 +22,9 @@ def test_odometry_that_lags_by_several_scans_starves_none(robot_in, hall_plan):
     for _ in range(20):
         robot.stamp += 0.1
         lag.append(Odometry(robot.stamp, robot.T_odom_base))
-        robot.tell(robot.scan())
+        robot.send(robot.scan())
         if len(lag) > 3:  # 0.3 s late, three scans
-            outputs = robot.tell(lag.pop(0))
+            outputs = robot.send(lag.pop(0))
             tracked += [output.stamp for output in outputs if isinstance(output, TrackedPose)]
     assert len(tracked) == 17
 
@@ -33,9 +33,9 @@ def test_what_waits_when_odometry_is_restarted_is_left_out(robot_in, hall_plan):
     robot = robot_in(hall_plan, SE2(1.5, 1.5, 0.0))
     robot.tick()
     robot.stamp += 0.1
-    robot.tell(robot.scan())
-    assert robot.tell(Odometry(robot.stamp - 50.0, SE2.identity())) == []
-    later = robot.tell(Odometry(robot.stamp + 1.0, SE2.identity()))
+    robot.send(robot.scan())
+    assert robot.send(Odometry(robot.stamp - 50.0, SE2.identity())) == []
+    later = robot.send(Odometry(robot.stamp + 1.0, SE2.identity()))
     assert not any(isinstance(output, TrackedPose) for output in later)
 
 
@@ -44,10 +44,10 @@ def test_of_several_scans_that_odometry_reaches_at_once_the_newest_is_used(robot
     robot.tick()
     for _ in range(5):
         robot.stamp += 0.1
-        assert robot.tell(robot.scan()) == []
-    tracked = poses_of(robot.tell(Odometry(robot.stamp, robot.T_odom_base)))
+        assert robot.send(robot.scan()) == []
+    tracked = poses_of(robot.send(Odometry(robot.stamp, robot.T_odom_base)))
     assert [pose.stamp for pose in tracked] == [robot.stamp]
-    assert poses_of(robot.tell(Odometry(robot.stamp + 1.0, robot.T_odom_base))) == []
+    assert poses_of(robot.send(Odometry(robot.stamp + 1.0, robot.T_odom_base))) == []
 
 
 def test_scans_do_not_pile_up_where_odometry_has_ended(robot_in, hall_plan):
@@ -55,9 +55,9 @@ def test_scans_do_not_pile_up_where_odometry_has_ended(robot_in, hall_plan):
     robot.tick()
     for _ in range(100):
         robot.stamp += 0.1
-        robot.tell(robot.scan())
+        robot.send(robot.scan())
     assert len(robot.localizer._scans._waiting) == 40
-    (pose,) = poses_of(robot.tell(Odometry(robot.stamp, robot.T_odom_base)))
+    (pose,) = poses_of(robot.send(Odometry(robot.stamp, robot.T_odom_base)))
     assert pose.stamp == robot.stamp
 
 
@@ -67,10 +67,10 @@ def test_a_scan_ahead_of_odometry_waits_while_older_ones_are_used(robot_in, hall
     early = robot.stamp
     for stamp in (early + 0.1, early + 0.2, early + 5.0):
         robot.stamp = stamp
-        robot.tell(robot.scan())
-    (pose,) = poses_of(robot.tell(Odometry(early + 0.3, robot.T_odom_base)))
+        robot.send(robot.scan())
+    (pose,) = poses_of(robot.send(Odometry(early + 0.3, robot.T_odom_base)))
     assert pose.stamp == early + 0.2
-    (pose,) = poses_of(robot.tell(Odometry(early + 5.5, robot.T_odom_base)))
+    (pose,) = poses_of(robot.send(Odometry(early + 5.5, robot.T_odom_base)))
     assert pose.stamp == early + 5.0
 
 
@@ -78,32 +78,32 @@ def test_a_scan_with_a_stamp_from_the_future_holds_up_no_other(robot_in, hall_pl
     robot = robot_in(hall_plan, SE2(1.5, 1.5, 0.0))
     robot.tick()
     now, robot.stamp = robot.stamp, 1e6
-    assert robot.tell(robot.scan()) == []
+    assert robot.send(robot.scan()) == []
     robot.stamp = now
     assert [pose.stamp for pose in poses_of(robot.tick())] == [robot.stamp]
 
 
-# ---- scans from somebody's hands
+# ---- scans of a lifted robot
 
 
 def lifted(robot, *, active):
-    return robot.tell(Signal(robot.stamp, SignalKind.WHEEL_DROP, active=active))
+    return robot.send(Signal(robot.stamp, SignalKind.WHEEL_DROP, active=active))
 
 
-def test_a_scan_that_was_taken_in_the_air_says_nothing_after_landing(robot_in, hall_plan):
+def test_a_scan_taken_in_the_air_is_ignored_after_landing(robot_in, hall_plan):
     """It came late, or odometry did."""
     robot = robot_in(hall_plan, SE2(1.5, 1.5, 0.0))
     robot.tick()
     lifted(robot, active=True)
     robot.stamp += 0.1
     waited, late = robot.scan(), robot.scan()
-    robot.tell(waited)
+    robot.send(waited)
     robot.stamp += 0.1
     lifted(robot, active=False)
-    assert poses_of(robot.tell(Odometry(robot.stamp, robot.T_odom_base))) == []
-    assert robot.tell(late) == []
+    assert poses_of(robot.send(Odometry(robot.stamp, robot.T_odom_base))) == []
+    assert robot.send(late) == []
     assert robot.localizer.state is State.SEARCHING
-    found = robot.tell(robot.scan())  # at the moment of landing
+    found = robot.send(robot.scan())  # at the moment of landing
     assert [pose.stamp for pose in poses_of(found)] == [robot.stamp] * 2
 
 
@@ -128,15 +128,15 @@ def test_a_robot_that_landed_before_the_clock_was_set_back_is_found_by_the_new_t
     lifted(robot, active=True)
     lifted(robot, active=False)
     robot.stamp = 5.0
-    robot.tell(Reset(5.0))
-    robot.tell(Odometry(5.0, robot.T_odom_base))
-    assert poses_of(robot.tell(robot.scan())) != []
+    robot.send(Reset(5.0))
+    robot.send(Odometry(5.0, robot.T_odom_base))
+    assert poses_of(robot.send(robot.scan())) != []
 
 
-def test_a_reset_says_that_the_robot_stands(robot_in, hall_plan):
-    """Its base was restarted in the air, and nobody has heard it land."""
+def test_a_reset_ends_the_lifted_state(robot_in, hall_plan):
+    """Its base was restarted in the air and never reports that it was set down."""
     robot = robot_in(hall_plan, SE2(1.5, 1.5, 0.0))
     lifted(robot, active=True)
     assert robot.tick() == []
-    robot.tell(Reset(robot.stamp))
+    robot.send(Reset(robot.stamp))
     assert poses_of(robot.tick()) != []

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-NEEDED = ("numpy", "numba", "llvmlite", "yaml", "platformdirs")
+NEEDED = ("numpy", "numba", "llvmlite", "yaml", "platformdirs", "msgspec")
 LEFT_OUT = ("cli", "lab", "plots", "web")
 
 HOOK = f"""

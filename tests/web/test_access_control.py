@@ -28,7 +28,7 @@ def site():
 
 @pytest.fixture
 def locked():
-    # One for each test: who asks with wrong tokens is soon kept waiting.
+    # One for each test: wrong tokens are rate-limited.
     with fed(AccessPolicy(TOKEN)) as site:
         yield site
 
@@ -102,7 +102,7 @@ def test_other_web_sites_can_neither_post_nor_watch(site: Site, origin: str):
 
 def test_the_own_page_and_programs_can(site: Site):
     own = site.url[:-1]
-    # There is no map yet; but that is known only to who may ask.
+    # There is no map yet, but only authorized clients may learn that.
     assert httpx.post(site.url + "v1/relocalize", headers={"origin": own}).status_code == 503
     assert httpx.post(site.url + "v1/relocalize").status_code == 503
     with connect(site.live, additional_headers={"Origin": own}) as viewer:

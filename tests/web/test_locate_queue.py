@@ -205,7 +205,7 @@ def test_a_few_requests_wait_and_the_rest_get_503(api, site, scan, monkeypatch):
         for future in early:
             assert future.result().status_code == 503
             assert future.result().headers["retry-after"] == "1"
-        assert api.get("/v1/status").status_code == 200  # nobody else waits
+        assert api.get("/v1/status").status_code == 200  # other requests do not wait
         go.set()
         statuses = [future.result().status_code for future in [first, *others]]
     assert statuses.count(200) == 1 + MOST_WAITING

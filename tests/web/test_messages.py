@@ -1,4 +1,4 @@
-"""The messages of the server say what the snapshot holds, in JSON that every client reads."""
+"""The messages of the server contain the snapshot, in JSON that every client reads."""
 
 from __future__ import annotations
 
@@ -54,9 +54,9 @@ def test_numbers_that_json_does_not_have_become_null(localized):
 
 def test_hello_describes_the_map_and_the_rights(localized):
     hello = Hello("sim", False, ("goal",), Map.of(localized.map), None, [])
-    said = json.loads(encode_text(hello))
-    assert said["map"]["width"] == localized.map.grid.width
-    assert (said["may_steer"], said["abilities"]) == (False, ["goal"])
+    sent = json.loads(encode_text(hello))
+    assert sent["map"]["width"] == localized.map.grid.width
+    assert (sent["may_steer"], sent["abilities"]) == (False, ["goal"])
 
 
 def test_a_map_name_that_is_not_utf_8_is_sent(localized):

@@ -63,7 +63,7 @@ def test_schemathesis_finds_no_deviation_from_the_document():
     arguments = (
         *("--seed", "1", "--max-examples", "10", "--generation-deterministic"),
         *("--rate-limit", "30/s", "--workers", "1", "--no-color"),
-        # Any bytes may be an .npz, as far as a schema can say.
+        # For a schema, any bytes may be an .npz.
         *("--exclude-checks", "positive_data_acceptance"),
     )
     with fed(store=begun.store) as site:

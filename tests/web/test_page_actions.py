@@ -184,7 +184,7 @@ def test_the_belief_is_a_heat_layer(visit: Visitor, rooms_server: Server) -> Non
     page.page.wait_for_selector("#paused", state="visible")
     x, y, _ = rooms_server.status()["hypotheses"][0]["pose"]
     page.look_at(x, y, 100.0)
-    # The corners of the cell of half a metre around the place, beside its symbol.
+    # The corners of the cell of half a metre around the place, next to its symbol.
     left, bottom = (
         0.5 * math.floor((c - o) / 0.5) + o for c, o in zip((x, y), ORIGIN, strict=True)
     )

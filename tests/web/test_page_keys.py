@@ -59,8 +59,8 @@ def test_keys_set_the_pose(page: Visit) -> None:
     keyboard.press("Shift+ArrowLeft")
     keyboard.press("Enter")
     match = page.wait_for_event(r"Hint from.* \((-?[\d.]+), (-?[\d.]+)\)")
-    said = float(match[1]), float(match[2])
-    assert math.dist(said, (x + 24.0 / scale, y)) < 0.05
+    shown = float(match[1]), float(match[2])
+    assert math.dist(shown, (x + 24.0 / scale, y)) < 0.05
     assert page.data("mode") == "look"
     keyboard.press(" ")
     page.wait_for_state("LOCALIZED")
@@ -110,10 +110,10 @@ def test_changes_are_announced_to_screen_readers(page: Visit) -> None:
     wait_until(lambda: "Press where" in spoken.inner_text(), spoken.inner_text)
     page.page.keyboard.press("Escape")
     count = """() => new Promise((done) => {
-        let said = 0;
-        const watch = new MutationObserver(() => (said += 1));
+        let shown = 0;
+        const watch = new MutationObserver(() => (shown += 1));
         watch.observe(document.getElementById("spoken"), { childList: true });
-        setTimeout(() => done(said), 2000);
+        setTimeout(() => done(shown), 2000);
     })"""
     page.page.wait_for_timeout(2500)
     assert page.page.evaluate(count) == 0  # scans that only confirm are not worth a word

@@ -30,7 +30,7 @@ from firstfix.web.timeline import MOST_EVENTS
 ASLEEP = 20
 PATIENCE_S = 30.0
 
-# A client that stops reading when it has enough does not hear that its good-bye was received.
+# A client that stops reading does not receive the answer to its close frame.
 connect = partial(connect_sync, max_queue=None, close_timeout=2.0)
 
 

@@ -1,4 +1,4 @@
-"""Ways of starting: each begins where it says, and goes on as the filter does."""
+"""Ways of starting: each starts at its pose, and continues as the filter does."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Which places look alike: told from verdicts and where the places lie."""
+"""Perceptual aliasing, from verdicts and the distances between places."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Processes: results in order, errors brought home, the dead reported, nobody left behind."""
+"""Processes: results in order, errors passed on, killed ones reported, none left running."""
 
 import math
 import multiprocessing

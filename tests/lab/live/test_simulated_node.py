@@ -63,7 +63,7 @@ def running(robot: SimulatedRobot, observer: Any = None) -> Iterator[tuple[Simul
     node.stop()
 
 
-def test_it_is_found_and_told_where_it_truly_is():
+def test_it_is_found_and_its_true_pose_is_sent():
     with running(SimulatedRobot(HOUSE, 1)) as (_, diary):
         until(lambda: diary.state is State.LOCALIZED)
     assert isinstance(diary.given[0], NewMap)
@@ -86,7 +86,7 @@ def test_what_is_given_is_taken_at_once_also_while_the_robot_is_paused():
         until(lambda: diary.state is State.LOCALIZED)
 
 
-def test_what_goes_wrong_is_told_and_it_goes_on():
+def test_errors_are_reported_and_it_continues():
     wrong = iter(["once"])
 
     def stumbles(given: Any) -> None:
@@ -100,7 +100,7 @@ def test_what_goes_wrong_is_told_and_it_goes_on():
     assert "over its own feet" in diary.warnings[0]
 
 
-def test_a_map_in_which_nothing_can_be_found_is_told():
+def test_a_map_that_cannot_be_searched_is_reported():
     cells = np.full((100, 100), FREE, np.int8)
     bare = OccupancyGrid(cells, 0.05)
     with running(SimulatedRobot(bare, 1)) as (_, diary):

@@ -114,7 +114,7 @@ def test_a_goal_behind_walls_is_refused():
         robot.drive_to((here.x + 8.0) % 32.0, here.y)
 
 
-def test_it_is_carried_and_its_wheels_tell(robot):
+def test_it_is_carried_and_the_wheel_drop_reports_it(robot):
     pose = SE2(*goal_of(HOUSE, 1))
     robot.carry_to(pose)
     moments = step_until(robot, lambda moment: moment.phase == "carry")

@@ -13,7 +13,7 @@ PERIOD_S = 0.5
 
 
 def stood(seconds: float, truth: SE2, published: SE2 | None, **more: object) -> list[Instant]:
-    """A robot that stands, and where it is said to be; None: searched for."""
+    """A robot at rest and its published pose; None while searching."""
     instant = Instant(0.0, truth, HOME, localized=published is not None, published=published)
     return [replace(instant, **more)] * round(seconds / PERIOD_S)  # type: ignore[arg-type]
 
@@ -76,7 +76,7 @@ def test_a_kidnap_goes_farther_than_half_a_metre_or_20_degrees(
     assert trial.aftermaths[0].is_kidnap is kidnapped
 
 
-def test_motion_that_odometry_knows_is_no_kidnap() -> None:
+def test_motion_that_odometry_measures_is_no_kidnap() -> None:
     trial = judge_trial(timed(CALM, after("teleport", stood(5.0, AWAY, AWAY, T_odom_base=AWAY))))
     assert not trial.aftermaths[0].is_kidnap
 
@@ -116,9 +116,9 @@ def test_only_useful_scans_count_towards_the_delay() -> None:
 
 def test_signalled_is_what_the_base_reports_while_it_happens() -> None:
     lifted = stood(2.0, HOME, None, disturbed=True, useful=False)
-    told = [replace(lifted[0], signalled=True), *lifted[1:]]
+    signalled_scans = [replace(lifted[0], signalled=True), *lifted[1:]]
     set_down = after("carry", stood(15.0, AWAY, AWAY))
-    for part, signalled in ((told, True), (lifted, False)):
+    for part, signalled in ((signalled_scans, True), (lifted, False)):
         (kidnap,) = judge_trial(timed(CALM, part, set_down)).aftermaths
         assert (kidnap.is_kidnap, kidnap.signalled) == (True, signalled)
         assert kidnap.left_after_s == 0.0

@@ -29,10 +29,10 @@ from firstfix.lab.reports.paper_report import (
 AWAY = SE2(-3.0, 1.0, 0.0)
 
 
-def told(words: str, start: Start = Start.FAST) -> Attempt:
+def attempt_of(words: str, start: Start = Start.FAST) -> Attempt:
     """Make an attempt of one second and one metre a letter.
 
-    r: right; w: sure of a wrong place; u: of a wrong place, not sure; -: nothing said.
+    r: right; w: certain of a wrong place; u: a wrong place, not certain; -: no pose.
     """
     beliefs = []
     for i, word in enumerate(words):
@@ -59,7 +59,7 @@ def told(words: str, start: Start = Start.FAST) -> Attempt:
 def test_how_an_attempt_ends(
     words: str, ending: Ending, time_s: float | None, misled_s: float
 ) -> None:
-    trial = judge_attempt("hall", 3, told(words))
+    trial = judge_attempt("hall", 3, attempt_of(words))
     assert (trial.world, trial.seed, trial.start) == ("hall", 3, Start.FAST)
     assert (trial.ending, trial.time_s, trial.driven_m) == (ending, time_s, time_s)
     assert trial.misled_s == misled_s
@@ -67,7 +67,7 @@ def test_how_an_attempt_ends(
 
 @pytest.mark.parametrize(("words", "scans"), [("rrrr", 1), ("--rr", 3), ("----", 4)])
 def test_the_start_costs_the_map_and_all_scans_up_to_the_first_pose(words: str, scans: int) -> None:
-    trial = judge_attempt("hall", 0, told(words))
+    trial = judge_attempt("hall", 0, attempt_of(words))
     assert trial.start_cpu_s == pytest.approx(0.5 + 0.01 * scans)
     assert trial.cpu_ms_per_scan == pytest.approx(10.0 if scans < 4 else 0.0)
 
@@ -75,7 +75,7 @@ def test_the_start_costs_the_map_and_all_scans_up_to_the_first_pose(words: str, 
 @pytest.fixture
 def document() -> dict[str, object]:
     trials = [
-        judge_attempt(world, seed, told(words, start))
+        judge_attempt(world, seed, attempt_of(words, start))
         for world, seed, start, words in (
             ("hall", 0, Start.UNIFORM, "wwwwwwww"),
             ("hall", 0, Start.FAST, "--rrrrrrr"),
@@ -121,15 +121,15 @@ def test_tables_show_every_row(document: dict) -> None:
 
 @pytest.fixture
 def shown(hall: OccupancyGrid, cross: LaserScan, middle: SE2) -> Shown:
-    def believed(start: Start, *poses: SE2 | None) -> Attempt:
+    def estimated(start: Start, *poses: SE2 | None) -> Attempt:
         beliefs = [Belief(float(i), middle, pose, False, 0.0) for i, pose in enumerate(poses)]
         cloud = np.array([[1.0, 1.0, 0.0]]) if poses[-1] else NO_CLOUD
         return Attempt(start, 0.0, tuple(beliefs), cloud, cloud)
 
     attempts = (
-        believed(Start.UNIFORM, SE2(2.0, 2.0, 1.0), SE2(8.0, 2.0, 1.0)),
-        believed(Start.BY_HAND, middle, middle),
-        believed(Start.SYSTEM, None, None),
+        estimated(Start.UNIFORM, SE2(2.0, 2.0, 1.0), SE2(8.0, 2.0, 1.0)),
+        estimated(Start.BY_HAND, middle, middle),
+        estimated(Start.SYSTEM, None, None),
     )
     return Shown("hall", 4, hall, (cross, cross), attempts)
 

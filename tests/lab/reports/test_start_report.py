@@ -35,7 +35,7 @@ def test_starts_are_counted_by_sensor() -> None:
     assert [narrow[key] for key in keys] == ["60° x 5 m", 5, 4, 2, 1, 1]
     assert (narrow["right_share"], narrow["wrong_share"], narrow["open_share"]) == (0.5, 0.25, 0.25)
     assert (narrow["way_m"], narrow["time_s"]) == (1.0, 2.0)
-    assert narrow["way_m_p90"] is None  # an open start: nobody knows how far
+    assert narrow["way_m_p90"] is None  # an open start: its path length is unknown
     assert (narrow["reports"], narrow["listed"], narrow["elsewhere"]) == (20, 0.5, 0.25)
     assert narrow["contained"] == 0.75
     assert recorded["way_m_p90"] == 0.0

@@ -1,4 +1,4 @@
-"""What is done to a robot parts odometry and truth as it says."""
+"""Disturbances separate odometry from the true pose by the stated amount."""
 
 import itertools
 import math
@@ -40,12 +40,12 @@ def moments_of(grid: OccupancyGrid, *phases: Phase, seed: int = 1) -> list[Momen
 
 
 def counted(moments: list[Moment]) -> SE2:
-    """Say how far the wheels turned from beginning to end."""
+    """Return how far the wheels turned from beginning to end."""
     return [e.T_odom_base for e in moments[-1].events if isinstance(e, Odometry)][-1]
 
 
 @pytest.mark.parametrize("disturbance", [Teleport(THERE), CarryTo(THERE, 1.0)])
-def test_a_kidnapped_robot_is_elsewhere_and_its_wheels_say_nothing(
+def test_a_kidnapped_robot_is_elsewhere_with_unchanged_odometry(
     flat: OccupancyGrid, disturbance: Phase
 ) -> None:
     moments = moments_of(flat, disturbance)

@@ -1,4 +1,4 @@
-"""Furniture hides things and shuts nobody in."""
+"""Furniture hides walls and encloses no free space."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""People walk where there is room, and go with the robot if they shall."""
+"""People walk in free space, or move with the robot."""
 
 import numpy as np
 import pytest

@@ -13,7 +13,7 @@ LSHAPE = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 2.0]])
 
 
 def drive(path: np.ndarray, start: SE2) -> list[SE2]:
-    """Let a robot without inertia do what the pilot says, for at most a minute."""
+    """Let a robot without inertia execute the pilot's commands, for at most a minute."""
     pilot, poses = Pilot(path), [start]
     while not pilot.arrived and len(poses) < 3000:
         v, w = pilot.command(poses[-1])
@@ -29,11 +29,11 @@ def test_it_arrives_wherever_the_robot_looks_at_first(yaw: float) -> None:
 
 def test_it_cuts_no_corner_by_much() -> None:
     for pose in drive(LSHAPE, SE2(0.0, 0.0, 0.0)):
-        beside = min(
+        off_path = min(
             math.hypot(pose.x - min(max(pose.x, 0.0), 3.0), pose.y),
             math.hypot(pose.x - 3.0, pose.y - min(max(pose.y, 0.0), 2.0)),
         )
-        assert beside < 0.2
+        assert off_path < 0.2
 
 
 def test_it_cruises_on_straight_parts_and_stops_at_the_end() -> None:

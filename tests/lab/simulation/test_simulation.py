@@ -46,8 +46,8 @@ def test_truth_is_that_of_the_scan(hall_plan: OccupancyGrid) -> None:
 def test_a_disturbance_is_reported_once(hall_plan: OccupancyGrid) -> None:
     moments_of = simulation(hall_plan)
     moments_of.disturbed(Disturbance.PUSHED)
-    told = [moments_of.step("stand").disturbance for _ in range(2)]
-    assert told == [Disturbance.PUSHED, None]
+    reported = [moments_of.step("stand").disturbance for _ in range(2)]
+    assert reported == [Disturbance.PUSHED, None]
 
 
 @pytest.mark.parametrize("command", [None, turning])

@@ -1,4 +1,4 @@
-"""Wheels count what they roll, and err as they are told to."""
+"""Wheels count how far they roll, with the configured errors."""
 
 import math
 
