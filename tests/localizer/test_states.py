@@ -111,13 +111,13 @@ def test_the_diagram_in_the_docs_is_drawn_from_the_table() -> None:
     assert f"```mermaid\n{diagram()}```" in page
 
 
-@pytest.mark.parametrize("page", ["states.md", "ros.md", "live.md"])
+@pytest.mark.parametrize("page", ["states.md", "ros.md"])
 def test_the_docs_name_every_state(page: str) -> None:
     text = (DOCS / page).read_text(encoding="utf-8")
     assert all(state.value in text for state in State)
 
 
 def test_the_page_has_words_for_every_state() -> None:
-    script = Path("src/firstfix/web/static/words.js")
+    script = Path("src/firstfix/web/static/format.js")
     text = (DOCS.parent / script).read_text(encoding="utf-8")
     assert all(f"  {state.value}: {{" in text for state in State)
