@@ -28,7 +28,6 @@ DOCUMENTED = re.findall(r"^\| `([\w.]+)` \|", PAGE.read_text(encoding="utf-8"), 
 BEAM = {"laser_model_type": "beam"}
 SKIP = {"laser_model_type": "likelihood_field_prob", "do_beamskip": True}
 ONE = {"belief.window": 1}
-TWO = ONE | {"monitor.decided_views": 2}
 START = {
     "set_initial_pose": True,
     "initial_pose.x": 3.0,
@@ -99,13 +98,11 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "monitor.lost_after_s": {"to": 0.1, "with": {"monitor.search_period_s": 1000.0}},
     "monitor.search_period_s": {"to": 1000.0},
     "monitor.confirmations": {"to": 5},
-    "monitor.new_view_m": {"to": 50.0, "in": "a loss", "with": TWO | {"monitor.new_view_rad": 3.0}},
-    "monitor.new_view_rad": {"to": 0.01, "in": "a loss", "with": TWO | {"monitor.new_view_m": 50}},
     "monitor.rest_period_s": {"to": 0.05, "in": "rooms"},
     "monitor.correct_m": {"to": 0.01},
     "monitor.correct_rad": {"to": 0.003},
     "monitor.decided_cost": {"to": 0.002},
-    "monitor.decided_views": {"to": 1, "in": "a loss", "with": ONE},
+    "monitor.decided_views": {"to": 1, "in": "a loss"},
     "belief.window": {"to": 1, "in": "rooms"},
     "belief.first_shortlist": {"to": 1, "in": "rooms"},
     "belief.shortlist": {"to": 1, "in": "a loss"},

@@ -47,12 +47,6 @@ class MonitorConfig:
     confirmations: int = setting(
         2, "consecutive scans that must agree on another place to move there", 1, 100
     )
-    new_view_m: float = setting(
-        0.5, "distance after which a scan counts as a new view after a loss, m", _LEAST, 100.0
-    )
-    new_view_rad: float = setting(
-        math.radians(30.0), "turn after which a scan counts as a new view, rad", _LEAST, math.pi
-    )
     rest_period_s: float = setting(
         1.0, "time between searches while a robot that is not found rests, s", _LEAST, 3600.0
     )
@@ -66,7 +60,7 @@ class MonitorConfig:
         1.3, "highest mean cost at which a track is moved to another place, nats", _LEAST, 100.0
     )
     decided_views: int = setting(
-        3, "views that must agree on a place far from where the pose was lost", 1, 100
+        3, "views that a place far from where the pose was lost needs", 1, 100
     )
 
     def __post_init__(self) -> None:

@@ -19,7 +19,6 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.places import SAME_PLACE_M, SAME_PLACE_RAD, is_same_place
 from firstfix.global_localization.scan_matcher import ScanMatcher
-from firstfix.localizer.agreement import LostPose
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.deciding_motion import FARTHEST_M, deciding_motion, second_look
 from firstfix.localizer.inputs import Input, NewMap, NoMotionUpdate, PoseHint, Reset, check_input
@@ -35,6 +34,9 @@ _HINT_M = 1.0
 _HINT_RAD = math.radians(40.0)
 # Log-likelihood of a prior down to which a place counts as the hinted one.
 _HINTED = -1.0
+
+# A robot that lost its pose is accepted at the first sure place within this distance.
+_STRAYED_M = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +84,7 @@ class Localizer:
         self._update_requested = False
         self._hint: Hint | None = None
         self._chosen_by: str | None = None
-        self._lost_pose = LostPose(self.config.monitor)
+        self._lost_T_map_odom: SE2 | None = None  # if contradicted, and not picked up since
         self._matcher: ScanMatcher
         self._tracker: PoseTracker
         self._places: PlaceBelief
@@ -268,7 +270,7 @@ class Localizer:
                 self._fire(Event.CONTRADICTED)
             return [self._status(scan.stamp, reason, best.evidence if best else None)]
         if verdict is Verdict.UNIQUE:
-            if not self._lost_pose.allows(best.pose, T_odom_base):
+            if not self._is_plausible(best, T_odom_base):
                 reason = "one place fits, far from where the pose was lost: waiting for more views"
                 return [self._status(scan.stamp, reason, best.evidence)]
             event = Event.ONE_PLACE_FITS if is_searching else Event.DECIDED
@@ -306,6 +308,7 @@ class Localizer:
                 reason = f"found {away:.1f} m from the tracked pose"
                 return self._arrive(scan, T_odom_base, place, Event.RELOCALIZED, reason)
             corrected = self._tracker.start(scan.stamp, T_odom_base, place)
+            self._places.restart()  # the wheels slipped: earlier views are not where they seem
             return [corrected, self._status(scan.stamp, "corrected", place.evidence)]
         if fit is Fit.CONTRADICTED:
             explained = place.evidence.explained
@@ -368,7 +371,7 @@ class Localizer:
     ) -> Status:
         """Discard everything about the pose, and change the state."""
         is_contradicted = event is Event.CONTRADICTED
-        self._lost_pose.set(self._tracker.T_map_odom if is_contradicted else None)
+        self._lost_T_map_odom = self._tracker.T_map_odom if is_contradicted else None
         self._tracker.stop()
         self._hint = self._chosen_by = None
         self._places.restart()
@@ -394,6 +397,18 @@ class Localizer:
         if self._update_requested:
             pace, self._update_requested = Pace.EVERY_SCAN, False
         return self._places.update(scan, T_odom_base, pace)
+
+    def _is_plausible(self, place: Hypothesis, T_odom_base: SE2) -> bool:
+        """Return whether a sure place may be published.
+
+        A robot that lost its pose and was not picked up is not far away, or it has left the mapped
+        area, where one scan may fit a wrong place: a place far away needs several views.
+        """
+        if self._lost_T_map_odom is None:
+            return True
+        if place.pose.distance_to(self._lost_T_map_odom @ T_odom_base) <= _STRAYED_M:
+            return True
+        return len(self._places.belief.window) >= self.config.monitor.decided_views
 
     def _change_frame(self, before: Odometry, now: Odometry) -> list[Output]:
         """Go on at the same pose in a new odometry frame; the next scan judges it."""
