@@ -27,7 +27,6 @@ DOCUMENTED = re.findall(r"^\| `([\w.]+)` \|", PAGE.read_text(encoding="utf-8"), 
 
 BEAM = {"laser_model_type": "beam"}
 SKIP = {"laser_model_type": "likelihood_field_prob", "do_beamskip": True}
-ONE = {"belief.window": 1}
 START = {
     "set_initial_pose": True,
     "initial_pose.x": 3.0,
@@ -102,7 +101,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "monitor.correct_m": {"to": 0.01},
     "monitor.correct_rad": {"to": 0.003},
     "monitor.decided_cost": {"to": 0.002},
-    "monitor.decided_views": {"to": 1, "in": "a loss"},
+    "monitor.decided_views": {"to": 1, "in": "a loss", "with": {"belief.window": 1}},
     "belief.window": {"to": 1, "in": "rooms"},
     "belief.first_shortlist": {"to": 1, "in": "rooms"},
     "belief.shortlist": {"to": 1, "in": "a loss"},
