@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "robots"))
 
 import dds_lab
+from node_lab import Converter, Running
 from recorder import Recorder
 from required import missing
 from ros1_lab import Lab, why_missing
@@ -42,3 +43,25 @@ def dds(tmp_path: Path) -> Iterator[dds_lab.Lab]:
 def recorder(ros2: Any) -> Recorder:
     """Give a transport that keeps what is published, with messages of ROS 2."""
     return Recorder(ros2)
+
+
+@pytest.fixture
+def run(recorder: Recorder) -> Iterator[Callable[..., Running]]:
+    """Give a function that makes a node; all are stopped at the end."""
+    made: list[Running] = []
+
+    def run(to: Recorder | None = None, *, start: bool = True, **parameters: Any) -> Running:
+        made.append(Running(to or recorder, **parameters))
+        if start:
+            made[-1].node.start()
+        return made[-1]
+
+    yield run
+    for each in made:
+        each.node.stop()
+
+
+@pytest.fixture
+def converter() -> Converter:
+    """Give a message converter with the default parameters."""
+    return Converter()

@@ -1,7 +1,6 @@
 """A whole node on real messages, with its real worker; only the wire is a recorder."""
 
 import threading
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from firstfix.io.maps.map_server import save_map
 from firstfix.io.ros_messages.incoming import to_planar, to_pose
 from firstfix.io.ros_messages.outgoing import occupancy_grid, pose_with_covariance
 from firstfix.localizer.inputs import NewMap, PoseHint, Reset
-from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.states import State
 from firstfix.ros import node as node_module
 from firstfix.ros.channels import AMCL_POSE, INITIAL_POSE, STATUS, Channel
@@ -27,53 +25,9 @@ from firstfix.ros.transport import Severity
 THERE = SE2(4.0, 3.0, 1.0)
 
 
-class Running:
-    """A node, its recorder, and the inputs and outputs of its localizer."""
-
-    def __init__(self, recorder, **settings):
-        self.recorder = recorder
-        self.handled = []
-        self.state = State.NO_MAP
-        self.node = Node(NodeConfig(**settings), recorder, [self._watch])
-        self.receive = self.node.receive
-
-    def _watch(self, given, outputs, localizer):
-        self.handled.append((given, outputs))
-        self.state = localizer.state
-
-    def given(self, kind):
-        return [given for given, _ in self.handled if isinstance(given, kind)]
-
-    def wait_until_handled(self, kind, n=1):
-        wait_for(lambda: len(self.given(kind)) >= n)
-
-
-@pytest.fixture
-def run(recorder):
-    """Give a function that makes a node; all are stopped at the end."""
-    made = []
-
-    def run(to=None, *, start=True, **settings):
-        made.append(Running(to or recorder, **settings))
-        if start:
-            made[-1].node.start()
-        return made[-1]
-
-    yield run
-    for each in made:
-        each.node.stop()
-
-
 @pytest.fixture
 def robot(ros2, hall_plan):
     return Speaker(ros2, hall_plan, THERE)
-
-
-def introduce(running, robot):
-    """Tell map, place of the laser, and odometry and scan of now."""
-    running.receive(Channel.MAP, robot.map())
-    running.receive(Channel.TF_STATIC, robot.fixed())
-    robot.report(running.receive)
 
 
 # ---- found, and handed over
@@ -81,7 +35,7 @@ def introduce(running, robot):
 
 def test_a_robot_is_found_from_its_first_scan(run, robot, recorder):
     running = run()
-    introduce(running, robot)
+    running.introduce(robot)
     (message,) = wait_for(lambda: recorder.on(INITIAL_POSE))
     reported = to_pose(message)
     assert to_planar(reported).distance_to(THERE) < 0.1
@@ -92,14 +46,14 @@ def test_a_robot_is_found_from_its_first_scan(run, robot, recorder):
 
 def test_the_same_in_messages_of_ros_1(run, wire, hall_plan):
     recorder = Recorder(wire)
-    introduce(run(recorder), Speaker(wire, hall_plan, THERE))
+    run(recorder).introduce(Speaker(wire, hall_plan, THERE))
     (message,) = wait_for(lambda: recorder.on(INITIAL_POSE))
     assert to_planar(to_pose(message)).distance_to(THERE) < 0.1
 
 
 def test_its_own_pose_that_comes_back_is_no_hint(run, robot, recorder):
     running = run()
-    introduce(running, robot)
+    running.introduce(robot)
     (own,) = wait_for(lambda: recorder.on(INITIAL_POSE))
     for _ in range(3):
         running.receive(Channel.INITIAL_POSE, own)
@@ -113,7 +67,7 @@ def test_its_own_pose_that_comes_back_is_no_hint(run, robot, recorder):
 
 def test_the_pose_of_a_person_is_a_hint(run, robot, ros2):
     running = run(mode=Mode.FULL)
-    introduce(running, robot)
+    running.introduce(robot)
     running.receive(
         Channel.INITIAL_POSE, pose_with_covariance(ros2.make, 0.0, "map", THERE, np.eye(3))
     )
@@ -125,7 +79,7 @@ def test_the_pose_of_a_person_is_a_hint(run, robot, ros2):
 
 def test_a_request_to_search_anew_is_followed(run, robot):
     running = run(mode=Mode.FULL)
-    introduce(running, robot)
+    running.introduce(robot)
     wait_for(lambda: running.state is State.LOCALIZED)
     running.receive(Channel.RESET)
     running.wait_until_handled(Reset)
@@ -136,7 +90,7 @@ def test_a_request_to_search_anew_is_followed(run, robot):
 
 def test_a_clock_set_back_is_survived(run, robot, recorder):
     running = run(mode=Mode.FULL)
-    introduce(running, robot)
+    running.introduce(robot)
     wait_for(lambda: running.state is State.LOCALIZED)
     robot.stamp = 5.0
     robot.report(running.receive)
@@ -149,7 +103,7 @@ def test_a_clock_set_back_is_survived(run, robot, recorder):
 
 def test_of_a_burst_no_odometry_is_lost_and_the_newest_scan_is_used(run, robot):
     running = run(start=False, mode=Mode.FULL)
-    introduce(running, robot)
+    running.introduce(robot)
     for i in range(1000):
         robot.move(SE2(0.0, 0.0, 0.001), 0.01)
         running.receive(Channel.TF, robot.tf())
@@ -166,7 +120,7 @@ def test_of_a_burst_no_odometry_is_lost_and_the_newest_scan_is_used(run, robot):
 
 def test_callbacks_of_many_threads_are_served_by_one(run, robot, recorder):
     running = run(mode=Mode.FULL)
-    introduce(running, robot)
+    running.introduce(robot)
     wait_for(lambda: running.state is State.LOCALIZED)
 
     def ask() -> None:
@@ -196,7 +150,7 @@ def test_it_can_be_stopped_before_between_and_after(run):
 
 def test_the_end_waits_for_what_is_being_thought_and_begins_nothing_more(run, robot):
     running = run(mode=Mode.FULL)
-    introduce(running, robot)
+    running.introduce(robot)
     for _ in range(200):
         running.receive(Channel.RESET)
     running.node.stop()
@@ -224,144 +178,6 @@ def test_the_end_does_not_wait_for_ever(run, robot, recorder, monkeypatch):
     go_on.set()
     node._worker.join(60.0)
     assert not node._worker.is_alive()
-
-
-# ---- errors
-
-
-class Broken(Recorder):
-    """A wire that is cut for one topic."""
-
-    def publish(self, topic, message):
-        if topic is STATUS:
-            raise RuntimeError("the wire is cut")
-        super().publish(topic, message)
-
-
-def test_an_internal_error_does_not_end_the_node_and_is_logged_once(run, robot, ros2, monkeypatch):
-    monkeypatch.setattr(node_module, "_REPEAT_S", 1000.0)
-    recorder = Broken(ros2)
-    running = run(recorder, mode=Mode.FULL)
-    introduce(running, robot)
-    for _ in range(5):
-        robot.move()
-        robot.report(running.receive)
-        wait_for(lambda: [m for m in recorder.on(AMCL_POSE) if to_pose(m).stamp == robot.stamp])
-        running.receive(Channel.RESET)
-    (error,) = recorder.logged(Severity.ERROR)
-    assert error.startswith("an error of firstfix itself:\nTraceback")
-    assert "the wire is cut" in error
-
-
-def test_a_localizer_that_fails_is_replaced_and_searches_the_same_map(
-    run, robot, recorder, monkeypatch
-):
-    running = run(mode=Mode.FULL)
-    introduce(running, robot)
-    wait_for(lambda: running.state is State.LOCALIZED)
-    handle = Localizer.handle
-
-    def fail_once(self, given):
-        monkeypatch.setattr(Localizer, "handle", handle)
-        del self._tracker  # half-changed
-        raise ZeroDivisionError("by chance")
-
-    monkeypatch.setattr(Localizer, "handle", fail_once)
-    running.receive(Channel.UPDATE)
-    wait_for(lambda: running.state is State.SEARCHING)
-    wait_for(lambda: len(recorder.logged(Severity.ERROR)) == 2)
-    reported, traceback = recorder.logged(Severity.ERROR)
-    assert reported == "the localizer failed and was reset: searching the whole map again"
-    assert "by chance" in traceback
-    robot.move()
-    robot.report(running.receive)
-    wait_for(lambda: running.state is State.LOCALIZED)
-
-
-def test_a_localizer_that_fails_on_a_new_map_keeps_the_old_one(run, robot, ros2, monkeypatch):
-    running = run(mode=Mode.FULL)
-    introduce(running, robot)
-    wait_for(lambda: running.state is State.LOCALIZED)
-    handle = Localizer.handle
-    other = OccupancyGrid(np.rot90(robot.world.cells).copy(), robot.world.resolution)
-
-    def fail_on_another(self, given):
-        if isinstance(given, NewMap) and given.grid.width == other.width:
-            raise ZeroDivisionError("by chance")
-        return handle(self, given)
-
-    monkeypatch.setattr(Localizer, "handle", fail_on_another)
-    running.receive(Channel.MAP, ros2.sent(occupancy_grid(ros2.make, 2.0, "map", other)))
-    wait_for(lambda: running.state is State.SEARCHING)
-    robot.move()
-    robot.report(running.receive)
-    wait_for(lambda: running.state is State.LOCALIZED)
-
-
-def test_invalid_messages_are_logged_in_one_sentence_and_do_not_end_the_node(run, robot, recorder):
-    running = run(mode=Mode.FULL)
-    introduce(running, robot)
-    bad = robot.scan()
-    bad.range_max = 0.0
-    running.receive(Channel.SCAN, bad)
-    warning = wait_for(lambda: recorder.logged(Severity.WARNING))[0]
-    assert warning.startswith("expected a range_max above range_min, received")
-    robot.report(running.receive)
-    wait_for(lambda: running.state is State.LOCALIZED)
-
-
-def test_each_warning_is_rate_limited(run, robot, recorder, monkeypatch):
-    monkeypatch.setattr(node_module, "_REPEAT_S", 1000.0)
-    running = run()
-    running.receive(Channel.MAP, robot.map())
-    for i in range(20):
-        robot.move()
-        running.receive(Channel.TF, robot.tf())
-        running.receive(Channel.SCAN, robot.scan("lidar"))  # a frame without a transform
-        bad = robot.map()
-        bad.info.width = i  # each time another sentence
-        running.receive(Channel.MAP, bad)
-        running.receive(Channel.UPDATE)
-        wait_for(lambda n=i + 1: len(running.given(Odometry)) == n)
-    about_maps, about_scans = sorted(recorder.logged(Severity.WARNING), reverse=True)
-    assert about_maps.startswith("expected 0 x 160 cells")
-    assert about_scans.startswith("1 scans dropped so far; the pose of the laser is unknown")
-
-
-def test_warnings_come_again_when_their_time_is_over(run, recorder, monkeypatch):
-    monkeypatch.setattr(node_module, "_REPEAT_S", 0.0)
-    running = run()
-    for _ in range(3):
-        running.receive(Channel.CLIFF, SimpleNamespace(data="no event"))
-    wait_for(lambda: len(recorder.logged(Severity.WARNING)) == 3)
-
-
-def test_silent_topics_are_named_although_others_speak(run, robot, recorder, monkeypatch):
-    monkeypatch.setattr(node_module, "_SILENCE_S", 0.05)
-    running = run()
-
-    def speak():
-        robot.move(seconds=0.01)
-        running.receive(Channel.TF, robot.tf())
-        return len(recorder.logged(Severity.WARNING)) >= 2
-
-    wait_for(speak)
-    assert sorted(recorder.logged(Severity.WARNING)) == [
-        "no message on map (nav_msgs/OccupancyGrid) for 0 s",
-        "no message on scan (sensor_msgs/LaserScan) for 0 s",
-    ]
-
-
-def test_scans_that_need_no_conversion_are_used_too(run, robot, recorder, monkeypatch, hall_plan):
-    monkeypatch.setattr(node_module, "_SILENCE_S", 0.2)
-    running = run(mode=Mode.FULL)
-    running.node.give(NewMap(0.0, hall_plan))
-    running.node.give(Odometry(1.0, SE2.identity()))
-    for _ in range(10):
-        running.node.give(LaserScan(np.ones(9, np.float32), 0.0, 0.1, 0.1, 5.0, stamp=1.0))
-        running.wait_until_handled(LaserScan)
-    assert len(running.given(NewMap)) == 1
-    assert not any("scan" in text for text in recorder.logged(Severity.WARNING))
 
 
 # ---- maps
@@ -399,7 +215,7 @@ def test_a_map_that_cannot_be_used_is_refused_at_the_start(run, recorder, tmp_pa
 
 def test_a_map_that_cannot_be_searched_leaves_the_one_in_use(run, robot, recorder, ros2):
     running = run(mode=Mode.FULL)
-    introduce(running, robot)
+    running.introduce(robot)
     wait_for(lambda: running.state is State.LOCALIZED)
     empty = OccupancyGrid(np.zeros((20, 20), np.int8), 0.05)
     running.receive(Channel.MAP, occupancy_grid(ros2.make, 3.0, "map", empty))
@@ -419,7 +235,7 @@ def test_settings_out_of_their_range_make_no_node():
 
 def test_when_scans_stop_the_status_becomes_stale_once(run, robot, recorder):
     running = run(mode=Mode.FULL, scan_timeout=0.2)
-    introduce(running, robot)
+    running.introduce(robot)
     wait_for(lambda: [m for m in recorder.on(STATUS) if m.status[0].level == 3])
     wait_for(lambda: running.state is State.LOCALIZED)
     (warning,) = recorder.logged(Severity.WARNING)

@@ -149,7 +149,8 @@ class Drive:
             node._map = NewMap(0.0, load_map(folder / config.yaml_filename))
         node._prepare()
         for channel, message in self.messages:
-            node._take_all([(channel, message)])
+            node.receive(channel, message)
+            node._take_all(node._inbox.take(0.0))
         node._scan_at -= 3.0  # s pass without a scan
         node._check_scans()
         node._memory.close()

@@ -66,7 +66,9 @@ class Node:
         self._map: NewMap | None = None  # of yaml_filename, then the one in use
         self._logged_at: dict[str, float] = {}
         self._received: set[Channel] = set()
-        self._scan_at = math.inf  # time of the last scan; infinite before the first and once stale
+        self._scan_at = (
+            math.inf
+        )  # arrival of the last scan; infinite before the first and once stale
         self.expects_topics_since = math.inf  # infinite while the transport passes nothing on
         self._worker = threading.Thread(target=self._work, name="firstfix", daemon=True)
 
@@ -102,6 +104,8 @@ class Node:
             None for a request.
         """
         is_scan = channel is Channel.SCAN or isinstance(message, LaserScan)
+        if is_scan:
+            self._scan_at = time.monotonic()  # here: a search may keep the worker for seconds
         put = self._inbox.put_scan if is_scan else self._inbox.put
         put((channel, message))
 
@@ -151,7 +155,6 @@ class Node:
             if self._inbox.is_closed:
                 return
             is_scan = channel is Channel.SCAN or isinstance(message, LaserScan)
-            self._scan_at = time.monotonic() if is_scan else self._scan_at
             self._received.add(Channel.SCAN if is_scan else channel)
             self._try(self._take, channel, message)
 
