@@ -172,7 +172,7 @@ def search(url: str) -> None:
     print(
         f"\nPOST /v1/locate, {BEAMS} beams as JSON: {statistics.median(extra_ms):.1f} ms", end=" "
     )
-    print(f"(p95 {np.quantile(extra_ms, 0.95):.1f}) beside the search,", end=" ")
+    print(f"(p95 {np.quantile(extra_ms, 0.95):.1f}) more than the search,", end=" ")
     print(f"which takes {statistics.median(search_ms):.1f} ms (median)")
 
 

@@ -27,7 +27,7 @@ from PIL import Image
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-WINDOW = {"width": 1152, "height": 648}
+WINDOW = {"width": 1280, "height": 720}
 PICTURE = (960, 540)
 FRAMES_A_SECOND = 6
 COLOURS = 64
@@ -144,7 +144,7 @@ def act(page: Page) -> None:
     hand.wait(3.5)
     hand.press_button("#mode-carry")
     hand.press_and_pull(*PUT_DOWN)
-    page.wait_for_selector("#app[data-state=SEARCHING]")
+    page.wait_for_selector("#app[data-state=LIFTED]")
     page.wait_for_selector("#app[data-state=LOCALIZED]")
     hand.wait(1.5)
     hand.press_button("#mode-goal")

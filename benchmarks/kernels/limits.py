@@ -266,10 +266,10 @@ def _add_min(kind: type[np.integer]) -> Callable[..., None]:
 
 @njit
 def _chained(values: NDArray[np.int32]) -> int:
-    beside = 1 << 20
+    previous = 1 << 20
     for i in range(values.size):
-        beside = min(int(values[i]), beside + 1)
-    return beside
+        previous = min(int(values[i]), previous + 1)
+    return previous
 
 
 @njit

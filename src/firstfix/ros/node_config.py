@@ -31,7 +31,7 @@ class NodeConfig:
 
     mode: Mode = setting(
         Mode.BOOTSTRAP,
-        "bootstrap: publish initialpose for an AMCL that runs beside; full: replace AMCL",
+        "bootstrap: publish initialpose for a separate AMCL; full: replace AMCL",
     )
     yaml_filename: str = setting("", "map file to load; empty: use map_topic")
     base_frame_id: str = setting("base_footprint", "frame of the base")
