@@ -147,6 +147,14 @@ def test_nav2s_localization_is_replaced_under_its_own_names(launch_file: Callabl
     assert {node["namespace"] for node in (server, ours, manager)} == {"robot1"}
 
 
+def test_the_launch_file_of_a_kobuki_remaps_topics_of_the_node() -> None:
+    launch = ET.parse(ROS / "ros1" / "kobuki.launch").getroot()  # noqa: S314 - our own file
+    names = {topic.name for topic in subscribed_topics(NodeConfig()).values()}
+    remapped = {rule.get("from"): rule.get("to") for rule in launch.iter("remap")}
+    assert set(remapped) == {name for name in names if name.startswith("events/")}
+    assert all(new == f"mobile_base/{old}" for old, new in remapped.items())
+
+
 def test_viewers_are_set_up_for_the_topics_of_the_node() -> None:
     config = NodeConfig(mode=Mode.FULL)
     topics = [*subscribed_topics(config).values(), *published_topics(config, PARTICLES)]
