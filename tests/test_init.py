@@ -51,6 +51,7 @@ PUBLIC = [
     "TrackedPose",
     "Trajectory",
     "Verdict",
+    "deskew",
     "load_map",
     "load_recording",
     "load_trajectory",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from firstfix.amcl.config import AmclConfig, MotionModel, SensorModel
     from firstfix.belief.prior import All, AnyOf, Near, Region
+    from firstfix.core.deskew import deskew
     from firstfix.core.errors import FirstfixError, InputError, MapError, ScanError
     from firstfix.core.estimate import Evidence, Hypothesis, LocateResult, SearchReport, Verdict
     from firstfix.core.grid import OccupancyGrid
@@ -84,6 +85,7 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "TrackedPose",
     "Trajectory",
     "Verdict",
+    "deskew",
     "load_map",
     "load_recording",
     "load_trajectory",
@@ -100,6 +102,7 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
 _MODULES = {
     "amcl.config": ("AmclConfig", "MotionModel", "SensorModel"),
     "belief.prior": ("All", "AnyOf", "Near", "Region"),
+    "core.deskew": ("deskew",),
     "core.errors": ("FirstfixError", "InputError", "MapError", "ScanError"),
     "core.estimate": ("Evidence", "Hypothesis", "LocateResult", "SearchReport", "Verdict"),
     "core.grid": ("OccupancyGrid",),

@@ -52,12 +52,12 @@ def read_log(
     laser_frame: str | None,
     max_scans: int | None = None,
 ) -> Recording:
-    """Read a recording under these options, as `load_recording` does."""
+    """Read a recording under these options, and straighten its scans by its odometry."""
     from firstfix.core.scan import Mounting
     from firstfix.io.logs.load import load_recording
 
     x_y_yaw, is_upside_down = (None, False) if laser_pose is None else _parsed(laser_pose)
-    return load_recording(
+    recording = load_recording(
         path,
         topic=topics,
         max_scans=max_scans,
@@ -66,6 +66,7 @@ def read_log(
         base_frame=base_frame,
         laser_frame=laser_frame,
     )
+    return recording.deskewed()
 
 
 def _parsed(text: str) -> tuple[tuple[float, float, float], bool]:

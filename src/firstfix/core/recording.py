@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.arguments import as_instance
+from firstfix.core.deskew import deskew
 from firstfix.core.errors import ScanError
 from firstfix.core.odometry import Odometry
 from firstfix.core.scan import LaserScan
@@ -115,6 +116,17 @@ class Recording:
             (i, *(int(j) for j in together if abs(stamps[j] - stamps[i]) <= MOST_APART_S))
             for i, *together in zip(first, *nearest, strict=True)
         ]
+
+    def deskewed(self) -> Recording:
+        """Return the recording with scans straightened by its odometry, where it has one.
+
+        See Also
+        --------
+        firstfix.deskew : For one scan.
+        """
+        if self.odometry is None:
+            return self
+        return replace(self, scans=tuple(deskew(scan, self.odometry) for scan in self.scans))
 
     def messages(self) -> Iterator[Odometry | LaserScan]:
         """Return odometry and scans in the order of their stamps, as a robot sends them.

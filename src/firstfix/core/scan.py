@@ -52,6 +52,12 @@ class LaserScan:
         Pose of the sensor on the robot. A tuple (x, y, yaw) in metres and radians is accepted.
     mounting : Mounting or str
         ``UPSIDE_DOWN`` mirrors the bearings.
+    time_increment : float
+        Time from beam to beam, s; 0 for a sensor that looks everywhere at once, or if it is
+        unknown. ``stamp`` is that of the first beam.
+    directions : ndarray, shape (n,), or None
+        Bearings of a scan that was straightened (`deskew`), seen from above, rad; None for equal
+        angles. Made read-only.
 
     Raises
     ------
@@ -85,6 +91,8 @@ class LaserScan:
     stamp: float = 0.0
     T_base_laser: SE2 = field(default_factory=SE2.identity)
     mounting: Mounting = Mounting.UPRIGHT
+    time_increment: float = 0.0
+    directions: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         ranges = _as_ranges(self.ranges)
@@ -125,6 +133,14 @@ class LaserScan:
             f"stamp {self.stamp}",
             "use 0 if the time is unknown",
         )
+        _check(
+            math.isfinite(self.time_increment) and self.time_increment >= 0.0,
+            "a finite time_increment of at least 0 s",
+            f"time_increment {self.time_increment}",
+            "use 0 if it is unknown",
+        )
+        if self.directions is not None:
+            object.__setattr__(self, "directions", _as_directions(self.directions, n))
         object.__setattr__(self, "ranges", ranges)
         object.__setattr__(self, "T_base_laser", as_pose(self.T_base_laser, "T_base_laser"))
         object.__setattr__(self, "mounting", as_member(Mounting, self.mounting, "mounting"))
@@ -140,6 +156,8 @@ class LaserScan:
     @cached_property
     def bearings(self) -> NDArray[np.float64]:
         """Bearing of each beam, seen from above, in the upright sensor frame, shape (n,), rad."""
+        if self.directions is not None:
+            return self.directions
         bearings = self.angle_min + self.angle_increment * np.arange(
             len(self.ranges), dtype=np.float64
         )
@@ -175,6 +193,18 @@ def _as_ranges(ranges: ArrayLike) -> NDArray[np.float32]:
     )
     with np.errstate(over="ignore"):  # beyond float32 is infinitely far
         array = array.astype(np.float32)
+    array.flags.writeable = False
+    return array
+
+
+def _as_directions(directions: ArrayLike, n: int) -> NDArray[np.float64]:
+    array = np.array(directions, np.float64)
+    _check(
+        array.shape == (n,) and np.isfinite(array).all(),
+        f"{n} finite directions",
+        f"directions of shape {array.shape}",
+        "give one for each beam, or None",
+    )
     array.flags.writeable = False
     return array
 

@@ -38,7 +38,7 @@ MAX_RUN = 2.0**53
 MAX_BYTES = 2**30
 
 _REQUIRED = ("ranges", "angle_min", "angle_increment", "range_min", "range_max")
-_OPTIONAL = ("stamp", "true_pose", "odom", "run_id", "T_base_laser")
+_OPTIONAL = ("stamp", "true_pose", "odom", "run_id", "T_base_laser", "time_increment")
 
 _Arrays = dict[str, NDArray[Any]]
 
@@ -50,7 +50,8 @@ def load_npz(path: str | Path, *, max_scans: int | None = None) -> Recording:
     rad, ``range_min``, ``range_max`` m; optional ``true_pose`` [n, 3] and ``odom`` [n, 3]
     (x m, y m, yaw rad: poses of the *sensor*; NaN if unknown), ``stamp`` [n] s
     (ascending but for some jitter, which is sorted out and noted; without it the scan index
-    counts as seconds), ``run_id`` [n], ``T_base_laser`` [3] (without it the base is the sensor).
+    counts as seconds), ``run_id`` [n], ``T_base_laser`` [3] (without it the base is the sensor),
+    ``time_increment`` s.
 
     Parameters
     ----------
@@ -296,7 +297,8 @@ def _trajectory(stamps: NDArray[np.float64], poses: NDArray[np.float64]) -> Traj
 def _scans(
     arrays: _Arrays, ranges: NDArray[Any], stamps: NDArray[np.float64], T_base_laser: SE2
 ) -> tuple[LaserScan, ...]:
-    sensor: dict[str, Any] = {name: _number(arrays, name) for name in _REQUIRED[1:]}
+    names = [*_REQUIRED[1:], *(["time_increment"] if "time_increment" in arrays else [])]
+    sensor: dict[str, Any] = {name: _number(arrays, name) for name in names}
     scans = []
     for i, (row, stamp) in enumerate(zip(ranges, stamps.tolist(), strict=False)):
         with located(f"scan {i}"):
@@ -314,6 +316,7 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
         "angle_increment": np.array(first.mounting.value * first.angle_increment),
         "range_min": np.array(first.range_min),
         "range_max": np.array(first.range_max),
+        "time_increment": np.array(first.time_increment),
         "stamp": stamps,
         "T_base_laser": first.T_base_laser.as_array(),
     }
@@ -328,13 +331,14 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
     return arrays
 
 
-def _sensor(scan: LaserScan) -> tuple[int, float, float, float, float, SE2, Mounting]:
+def _sensor(scan: LaserScan) -> tuple[int, float, float, float, float, float, SE2, Mounting]:
     return (
         len(scan),
         scan.angle_min,
         scan.angle_increment,
         scan.range_min,
         scan.range_max,
+        scan.time_increment,
         scan.T_base_laser,
         scan.mounting,
     )

@@ -123,7 +123,14 @@ def to_laser_scan(
         stamp=to_seconds(message.header.stamp) if stamp is None else stamp,
         T_base_laser=T_base_laser,
         mounting=mounting,
+        time_increment=_time_increment(message),
     )
+
+
+def _time_increment(message: Any) -> float:
+    """Return the time between two beams, s; 0 for what some drivers send instead of it."""
+    step = float(getattr(message, "time_increment", 0.0))
+    return step if 0.0 < step < math.inf else 0.0
 
 
 def to_grid(message: Any) -> OccupancyGrid:

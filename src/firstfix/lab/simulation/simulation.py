@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from firstfix.core.angles import FULL_TURN
 from firstfix.core.odometry import Odometry, Signal
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
@@ -162,6 +163,9 @@ class Simulation:
             circles=circles,
             T_map_base_after=self.robot.T_map_base if self._shutter is Shutter.ROLLING else None,
         )
+        if self._shutter is Shutter.ROLLING:
+            per_beam = PERIOD_S * self.lidar.angle_increment / FULL_TURN
+            scan = replace(scan, time_increment=per_beam)
         # A scan has the stamp of its first beam, though it is complete only with its last.
         beginning = sum(event.stamp == stamp for event in events)
         events.insert(beginning, scan)
