@@ -76,6 +76,7 @@ def test_the_document_has_the_keys_of_the_page_and_the_error() -> None:
         "pose",
         "covariance",
         "hypotheses",
+        "probability_without_prior",
         "search",
         "elapsed_s",
         "error",
