@@ -8,12 +8,13 @@ import math
 import numpy as np
 import pytest
 
+from firstfix.belief.judge import SECOND_LOOK_RAD
 from firstfix.core.estimate import Evidence, Hypothesis
 from firstfix.core.se2 import SE2
 from firstfix.fields.raycast import expected_ranges
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import random_free_poses
-from firstfix.localizer.deciding_motion import deciding_motion
+from firstfix.localizer.deciding_motion import advise, deciding_motion
 from firstfix.localizer.outputs import MotionRequest
 
 POSE = SE2(2.5, 2.0, 0.0)
@@ -121,3 +122,21 @@ def test_a_sensor_that_sees_nothing_leads_to_no_request(hall_plan):
     lidar = Lidar(beams=60, range_max=0.2)
     poses = [SE2(4.0, 3.0, 1.0), SE2(3.0, 3.0, -1.0)]
     assert deciding_motion(seen(hall_plan, poses[0], lidar), places(*poses), hall_plan) is None
+
+
+def test_one_place_that_is_left_needs_a_second_look(hall_plan):
+    pose = SE2(4.0, 3.0, 1.0)
+    scan = seen(hall_plan, pose, Lidar(beams=60))
+    words, motion = advise(scan, places(pose), 1, hall_plan)
+    assert words == ""
+    assert motion is not None
+    assert motion.ahead == 0.0
+    assert motion.turn > SECOND_LOOK_RAD
+
+
+def test_rivals_without_a_deciding_motion_are_called_identical(three_rooms):
+    scan = seen(three_rooms, POSE, Lidar(beams=180))
+    rooms = places(*(SE2(8.0 * i, 0.0, 0.0) @ POSE for i in range(3)))
+    words, motion = advise(scan, rooms, 3, three_rooms)
+    assert words == "3 places look identical to this sensor; no motion of up to 3 m would decide"
+    assert motion is None

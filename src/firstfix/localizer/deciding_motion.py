@@ -86,9 +86,32 @@ def deciding_motion(
     return best
 
 
-def second_look(scan: LaserScan) -> MotionRequest:
-    """Return the turn after which a single place that is left can be confirmed."""
-    return MotionRequest(scan.stamp, _SECOND_LOOK_RAD, 0.0, 0.0)
+def advise(
+    scan: LaserScan, places: Sequence[Hypothesis], rivals: int, grid: OccupancyGrid
+) -> tuple[str, MotionRequest | None]:
+    """Say what the choice between the places needs.
+
+    Parameters
+    ----------
+    scan, places, grid
+        As in `deciding_motion`.
+    rivals : int
+        Number of places that fit about equally well.
+
+    Returns
+    -------
+    str
+        In words; empty if only one place is left, which a second look can confirm.
+    MotionRequest or None
+        The motion.
+    """
+    if rivals <= 1:
+        return "", MotionRequest(scan.stamp, _SECOND_LOOK_RAD, 0.0, 0.0)
+    motion = deciding_motion(scan, places, grid)
+    if motion is not None:
+        return f"{rivals} places fit about equally well; motion would decide", motion
+    identical = f"{rivals} places look identical to this sensor"
+    return f"{identical}; no motion of up to {FARTHEST_M:.0f} m would decide", None
 
 
 def _room_ahead(grid: OccupancyGrid, T_map_base: SE2, turn: float) -> float:

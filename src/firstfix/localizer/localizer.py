@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from firstfix.amcl.particles import Particles
 from firstfix.belief.belief import Belief
-from firstfix.belief.prior import Near
 from firstfix.core.arguments import as_instance
 from firstfix.core.errors import InputError
 from firstfix.core.estimate import Evidence, Hypothesis, Verdict
 from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.global_localization.places import SAME_PLACE_M, SAME_PLACE_RAD, is_same_place
+from firstfix.global_localization.places import is_same_place
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.localizer.config import LocalizerConfig
-from firstfix.localizer.deciding_motion import FARTHEST_M, deciding_motion, second_look
-from firstfix.localizer.inputs import Input, NewMap, NoMotionUpdate, PoseHint, Reset, check_input
+from firstfix.localizer.deciding_motion import advise
+from firstfix.localizer.hint import Hint, read_hint
+from firstfix.localizer.inputs import Input, NewMap, PoseHint, Reset, check_input
 from firstfix.localizer.outputs import Hypotheses, InitialPose, Output, Status
 from firstfix.localizer.place_belief import Pace, PlaceBelief, Support
 from firstfix.localizer.pose_monitor import Fit
@@ -29,22 +27,8 @@ from firstfix.localizer.pose_tracker import PoseTracker, Tracked
 from firstfix.localizer.scan_queue import ScanQueue
 from firstfix.localizer.states import Event, State, next_state
 
-# A person's click is good to about a metre and 40 degrees.
-_HINT_M = 1.0
-_HINT_RAD = math.radians(40.0)
-# Log-likelihood of a prior down to which a place counts as the hinted one.
-_HINTED = -1.0
-
 # A robot that lost its pose is accepted at the first sure place within this distance.
 _STRAYED_M = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class Hint:
-    """A pose that was proposed: by whom, and as a prior."""
-
-    source: str
-    claim: Near
 
 
 class Localizer:
@@ -153,7 +137,8 @@ class Localizer:
             # A base that was restarted in the air never reports that it was set down.
             self._lifted.clear()
             return [self._restart(given.stamp, Event.RESET, "reset requested: searching")]
-        return self._take_update_request(given)
+        self._update_requested = True
+        return [self._status(given.stamp, "the next scan will be used in any case")]
 
     # ---- inputs
 
@@ -204,40 +189,23 @@ class Localizer:
         return [self._status(given.stamp, "set down: waiting for the next scan")]
 
     def _take_hint(self, given: PoseHint) -> list[Output]:
-        try:
-            claim = self._claim_of(given)
-        except InputError as error:
-            return [self._status(given.stamp, f"hint of {given.source} refused: {error}")]
-        if claim is None:
+        listed = self._places.places if self._state is not State.SEARCHING else ()
+        hint = read_hint(given, listed)
+        if hint is None:
             reason = f"place {given.hypothesis_id} is no longer listed: choose another one"
             return [self._status(given.stamp, reason)]
+        try:
+            if given.hypothesis_id is not None:
+                self._places.add_prior(hint.prior)
+            else:  # the robot may have been carried there: the views so far are worth nothing
+                self._places.restart(hint.prior)
+        except InputError as error:
+            return [self._status(given.stamp, f"hint of {given.source} refused: {error}")]
         self._tracker.stop()
-        self._hint, self._chosen_by = Hint(given.source, claim), None
+        self._hint, self._chosen_by = hint, None
         self._fire(Event.HINT_RECEIVED)
         reason = f"{given.source} proposes a pose: the next scan will verify it"
         return [self._status(given.stamp, reason)]
-
-    def _claim_of(self, given: PoseHint) -> Near | None:
-        """Add a hint to the belief as a prior; None if it names a place that is gone.
-
-        A listed place is weighed with the views so far. Any other pose may be that of a robot that
-        was carried there, so the views so far are discarded.
-        """
-        if given.hypothesis_id is None:
-            claim = Near(given.T_map_base, _HINT_M, _HINT_RAD)
-            self._places.restart(claim)
-            return claim
-        listed = self._places.places if self._state is not State.SEARCHING else ()
-        place = next((p for p in listed if p.id == given.hypothesis_id), None)
-        if place is None:
-            return None
-        claim = Near(place.pose, SAME_PLACE_M, SAME_PLACE_RAD)
-        self._places.add_prior(claim)
-        return claim
-
-    def _take_update_request(self, given: NoMotionUpdate) -> list[Output]:
-        self._update_requested = True
-        return [self._status(given.stamp, "the next scan will be used in any case")]
 
     def _use_next_scan(self) -> list[Output]:
         ready = self._scans.pop() if self._state is not State.NO_MAP else None
@@ -281,21 +249,20 @@ class Localizer:
 
     def _verify_hint(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
         """Let the belief judge a pose that was proposed."""
-        assert self._hint is not None  # noqa: S101 - every way into this state brings one
-        source, claim = self._hint.source, self._hint.claim
+        hint = self._hint
+        assert hint is not None  # noqa: S101 - every way into this state brings one
         if not self._weigh(scan, T_odom_base, Pace.EVERY_SCAN) or self._places.is_blind:
-            reason = f"{source} proposes a pose; the sensor sees too little to verify it"
+            reason = f"{hint.source} proposes a pose; the sensor sees too little to verify it"
             return [self._status(scan.stamp, reason)]
-        belief, places = self._places.belief, self._places.places
-        hinted = [p for p in places if claim.log_likelihood(p.pose.as_array()[None])[0] >= _HINTED]
-        if belief.verdict is Verdict.UNIQUE and places[0] in hinted:
+        verdict, places = self._places.belief.verdict, self._places.places
+        if verdict is Verdict.UNIQUE and hint.matches(places[0].pose):
             fit = f"{places[0].evidence.explained:.0%} of the beams fit"
-            reason = f"{source} proposed this pose; {fit}"
+            reason = f"{hint.source} proposed this pose; {fit}"
             return self._arrive(scan, T_odom_base, places[0], Event.HINT_CONFIRMED, reason)
-        if belief.verdict is Verdict.AMBIGUOUS and hinted:
+        if verdict is Verdict.AMBIGUOUS and any(hint.matches(place.pose) for place in places):
             self._fire(Event.SEVERAL_PLACES_FIT)
             return self._list_places(scan)
-        reason = f"the pose proposed by {source} does not explain the scan: searching"
+        reason = f"the pose proposed by {hint.source} does not explain the scan: searching"
         return [self._restart(scan.stamp, Event.HINT_REJECTED, reason)]
 
     def _follow(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
@@ -417,7 +384,7 @@ class Localizer:
             reason = "odometry jumped while several places fit: searching"
             return [self._restart(now.stamp, Event.ODOMETRY_JUMPED, reason)]
         if self._state is State.VERIFYING_HINT and self._hint is not None:
-            self._places.restart(self._hint.claim)
+            self._places.restart(self._hint.prior)
         else:
             self._places.restart()
         self._tracker.change_frame(before, now)
@@ -425,19 +392,11 @@ class Localizer:
 
     def _list_places(self, scan: LaserScan) -> list[Output]:
         """Report the places that are left, and the motion that would decide between them."""
-        places, rivals = self._places.places, self._places.rivals
-        motion = deciding_motion(scan, places, self._matcher.fields.grid)
-        reason = self._places.belief.reason
-        if rivals > 1 and motion is not None:
-            reason = f"{rivals} places fit about equally well; motion would decide"
-        elif rivals > 1:
-            reason = f"{rivals} places look identical to this sensor; no motion of up to "
-            reason += f"{FARTHEST_M:.0f} m would decide"
-        else:
-            motion = second_look(scan)
+        places, belief = self._places.places, self._places.belief
+        advice, motion = advise(scan, places, self._places.rivals, belief.fields.grid)
         outputs: list[Output] = [
-            Hypotheses(scan.stamp, places, self._places.belief.elsewhere),
-            self._status(scan.stamp, reason, places[0].evidence),
+            Hypotheses(scan.stamp, places, belief.elsewhere),
+            self._status(scan.stamp, advice or belief.reason, places[0].evidence),
         ]
         return [*outputs, motion] if motion is not None else outputs
 
