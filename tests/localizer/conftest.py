@@ -66,7 +66,7 @@ class Robot:
         return outputs
 
     def scan(self) -> LaserScan:
-        """Look around."""
+        """Return a scan at the present pose."""
         return self.lidar.scan(self.world, self.pose, self._rng, self.stamp)
 
     def tick(self, moved: SE2 | None = None, damage: Damage | None = None) -> list[Output]:
@@ -112,7 +112,7 @@ def robot_in(maps_cache: Path) -> Callable[..., Robot]:
 
 @pytest.fixture(scope="session")
 def with_ranges() -> Callable[..., Damage]:
-    """Give a function that makes a damage: all ranges of a scan become these."""
+    """Return a function that replaces all ranges of a scan."""
 
     def make(ranges: Callable[[LaserScan], object]) -> Damage:
         def damage(scan: LaserScan) -> LaserScan:

@@ -46,7 +46,7 @@ def test_a_robot_whose_places_differ_behind_it_turns(two_rooms, half_lidar):
     assert np.mean(np.abs(views[0] - views[1]) > 0.3) > 0.1
 
 
-def test_which_place_comes_first_makes_no_difference_between_two(two_rooms, half_lidar):
+def test_the_order_of_two_places_makes_no_difference(two_rooms, half_lidar):
     other = SE2(7.0, 0.0, 0.0) @ POSE
     scan = seen(two_rooms, POSE, half_lidar)
     there = deciding_motion(scan, places(POSE, other), two_rooms)
@@ -61,7 +61,7 @@ def test_no_motion_is_requested_between_identical_rooms(three_rooms):
     assert deciding_motion(scan, rooms, three_rooms) is None
 
 
-def test_the_gain_is_the_entropy_that_is_expected_to_go(two_rooms, half_lidar):
+def test_the_gain_is_the_expected_decrease_of_entropy(two_rooms, half_lidar):
     """Of three places two are identical: what is left in two cases of three is log 2."""
     other = SE2(7.0, 0.0, 0.0) @ POSE
     scan = seen(two_rooms, POSE, half_lidar)
@@ -70,7 +70,7 @@ def test_the_gain_is_the_entropy_that_is_expected_to_go(two_rooms, half_lidar):
     assert motion.gain == pytest.approx(math.log(3.0) - 2.0 / 3.0 * math.log(2.0), abs=0.1)
 
 
-def test_what_differs_already_here_is_no_gain(three_rooms):
+def test_differences_in_the_present_view_are_no_gain(three_rooms):
     """The present scan has not decided, although the map expects other ranges."""
     scan = seen(three_rooms, POSE, Lidar(beams=180))
     assert deciding_motion(scan, places(POSE, SE2(5.0, 3.0, 2.0)), three_rooms) is None

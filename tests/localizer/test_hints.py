@@ -68,7 +68,7 @@ def test_in_a_building_without_equals_a_wrong_hint_never_wins(
             assert is_at(pose.T_map_base, truth, 0.2, 5.0)
 
 
-def test_a_hint_that_is_a_little_off_is_put_right(robot_in, office, office_poses, poses, is_at):
+def test_a_hint_that_is_a_little_off_is_corrected(robot_in, office, office_poses, poses, is_at):
     rng = np.random.default_rng(3)
     robot = robot_in(office, office_poses(office, 1, 0)[0])
     for truth in office_poses(office, 15, 4):

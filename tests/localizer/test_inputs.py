@@ -21,7 +21,7 @@ def test_every_input_has_a_stamp_of_its_own() -> None:
         assert stamp.type == "float"
 
 
-def test_inputs_cannot_be_changed(hall_plan) -> None:
+def test_inputs_are_immutable(hall_plan) -> None:
     given = [NewMap(1.0, hall_plan), PoseHint(1.0, SE2.identity()), Reset(1.0), NoMotionUpdate(1.0)]
     for message in given:
         with pytest.raises(dataclasses.FrozenInstanceError):

@@ -60,7 +60,7 @@ def test_a_robot_in_the_air_is_not_searched_for_when_its_map_arrives(hall_plan, 
     assert poses(robot.tick()) != []
 
 
-def test_a_scan_from_the_hands_is_not_used_after_the_robot_is_set_down(in_hall, poses):
+def test_a_scan_taken_while_lifted_is_not_used_after_the_robot_is_set_down(in_hall, poses):
     in_hall.send(Signal(in_hall.stamp, SignalKind.WHEEL_DROP, active=True))
     in_hall.stamp += 0.1
     assert in_hall.send(in_hall.scan()) == []
@@ -129,9 +129,7 @@ def test_a_small_slip_is_corrected_before_any_search(
 
 
 @pytest.mark.parametrize("metres", [0.15, 0.25])
-def test_a_slip_too_small_for_a_doubt_is_mended_although_the_robot_stands(
-    in_hall, metres, of, is_at
-):
+def test_a_slip_too_small_for_a_doubt_is_corrected_at_rest(in_hall, metres, of, is_at):
     in_hall.pose = HERE @ SE2(metres, 0.0, math.radians(8.0))
     outputs = in_hall.ticks(30)
     assert is_at(of(TrackedPose, outputs)[-1].T_map_base, in_hall.pose, 0.1, 3.0)

@@ -31,7 +31,7 @@ def test_inputs_without_a_map_are_ignored_and_reported(hall_plan):
     assert localizer.particles is None
 
 
-def test_a_new_map_ends_all_that_was(in_hall, office, kinds, is_at, office_poses):
+def test_a_new_map_discards_the_pose_and_waiting_scans(in_hall, office, kinds, is_at, office_poses):
     in_hall.stamp += 0.1
     waiting = in_hall.scan()
     in_hall.send(waiting)
@@ -56,7 +56,7 @@ def test_a_map_that_cannot_be_searched_changes_nothing(in_hall, kinds):
 
 
 @pytest.mark.parametrize("reported", ["map", "reset", "lifted", "update"])
-def test_after_news_the_next_scan_is_searched_at_once(foreign, office, reported):
+def test_after_a_change_the_next_scan_is_searched_at_once(foreign, office, reported):
     robot = foreign
     if reported == "map":
         robot.send(NewMap(robot.stamp, office))
@@ -91,7 +91,7 @@ def test_an_update_can_be_asked_for_at_rest(in_hall):
     assert in_hall.localizer.particles is once  # one scan was asked for
 
 
-def test_a_right_hint_decides_between_twins(robot_in, three_rooms, kinds, is_at):
+def test_a_right_hint_decides_between_identical_rooms(robot_in, three_rooms, kinds, is_at):
     """A person decides between identical rooms."""
     robot = robot_in(three_rooms, IN_A_ROOM)
     robot.tick()
@@ -123,7 +123,7 @@ def test_a_wrong_hint_costs_one_scan(in_hall, hint, kinds, is_at):
 
 
 @pytest.mark.parametrize("hint", [SE2(900.0, 0.0, 0.0), SE2(-2.0, -2.0, 0.0)])
-def test_a_hint_outside_the_map_is_refused_and_nothing_is_lost(in_hall, hint, kinds):
+def test_a_hint_outside_the_map_is_refused_and_the_places_stay(in_hall, hint, kinds):
     (status,) = in_hall.send(PoseHint(in_hall.stamp, hint))
     assert status.state is State.LOCALIZED
     assert status.reason.startswith("hint of a person refused: expected a prior on the map")

@@ -47,7 +47,7 @@ def test_an_empty_buffer_has_no_odometry() -> None:
     steps=STEPS,
     asked=st.lists(st.floats(-0.2, 1.2), min_size=1, max_size=10),
 )
-def test_it_interpolates_as_a_trajectory_does(
+def test_the_buffer_interpolates_as_a_trajectory_does(
     begin: float, steps: list[tuple[float, float, float, float]], asked: list[float]
 ) -> None:
     stamps, poses = [begin], [SE2(99.0, 0.0, 3.0)]  # far from zero, where it would begin anew
@@ -73,7 +73,7 @@ def test_between_two_messages_it_is_a_line(share: float) -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_across_pi_it_turns_the_short_way(sign: float) -> None:
+def test_interpolation_across_pi_turns_the_short_way(sign: float) -> None:
     buffer = filled((0.0, SE2(0.0, 0.0, sign * 3.0)), (1.0, SE2(0.0, 0.0, sign * -3.0)))
     for share in (0.25, 0.5, 0.75):
         pose = buffer.at(share)
@@ -90,7 +90,7 @@ def test_there_is_no_odometry_outside_the_received_times() -> None:
         assert buffer.at(stamp) is None
 
 
-def test_it_holds_the_last_2000() -> None:
+def test_the_buffer_holds_the_last_2000() -> None:
     buffer = filled(*((0.02 * i, ramp(0.02 * i)) for i in range(2001)))
     assert buffer.at(0.0) is None
     assert buffer.at(0.019) is None
@@ -121,7 +121,7 @@ def test_of_two_messages_of_one_time_the_later_counts() -> None:
         (-1000.0, SE2(0.0, 0.0, 0.0)),
     ],
 )
-def test_a_jump_is_noticed_and_ends_the_past(seconds: float, moved: SE2) -> None:
+def test_a_jump_is_detected_and_earlier_odometry_discarded(seconds: float, moved: SE2) -> None:
     begin = SE2(3.0, 4.0, 2.0)
     buffer = filled((99.0, begin), (100.0, begin))
     now = Odometry(100.0 + seconds, begin @ moved)
@@ -148,7 +148,7 @@ def test_a_jump_is_noticed_and_ends_the_past(seconds: float, moved: SE2) -> None
         (3600.0, SE2(1000.0, 0.0, 1.0)),  # after a long gap anything is possible
     ],
 )
-def test_what_a_robot_can_do_is_no_jump(seconds: float, moved: SE2) -> None:
+def test_possible_motions_are_not_jumps(seconds: float, moved: SE2) -> None:
     begin = SE2(3.0, 4.0, 2.0)
     buffer = filled((99.0, begin), (100.0, begin))
     assert not buffer.add(Odometry(100.0 + seconds, begin @ moved))
@@ -164,7 +164,7 @@ def test_odometry_restarted_at_zero_is_a_jump_however_long_it_was_silent(
     assert buffer.add(Odometry(100.0 + seconds, start))
 
 
-def test_a_robot_that_drives_by_where_it_started_has_not_begun_anew() -> None:
+def test_odometry_near_its_start_is_not_taken_for_a_restart() -> None:
     filled(*((0.1 * i, SE2(0.25 * i - 3.0, 0.0, 0.0)) for i in range(25)))
     filled(*((0.5 * i, SE2(0.0, 0.0, i - 3.0)) for i in range(7)))
 

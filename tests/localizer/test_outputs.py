@@ -28,12 +28,12 @@ ONE_OF_EACH = [
 ]
 
 
-def test_these_are_all() -> None:
+def test_every_output_has_an_example_here() -> None:
     assert {type(output) for output in ONE_OF_EACH} == set(get_args(Output))
 
 
 @pytest.mark.parametrize("output", ONE_OF_EACH, ids=lambda output: type(output).__name__)
-def test_outputs_have_a_stamp_and_cannot_be_changed(output) -> None:
+def test_outputs_have_a_stamp_and_are_immutable(output) -> None:
     assert output.stamp == 1.0
     with pytest.raises(dataclasses.FrozenInstanceError):
         output.stamp = 2.0

@@ -1,4 +1,4 @@
-"""The published pose is fused with a refinement of the scan: sharper, and never led astray."""
+"""The published pose is fused with a refinement of the scan: more precise, never wrong."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ def test_the_right_pose_is_consistent_and_needs_no_search(monitor, seen, searche
 
 
 @pytest.mark.parametrize("moved", [SE2.identity(), SE2(0.1, 0.0, 0.1)])
-def test_elsewhere_takes_two_scans_that_agree(monitor, seen, moved):
+def test_moving_to_another_place_takes_two_scans_that_agree(monitor, seen, moved):
     """Carried by odometry: the robot may drive meanwhile."""
     first = monitor.judge(seen(THERE, 0.0), ODOM, HERE)
     assert first.fit is Fit.DOUBTFUL

@@ -15,7 +15,7 @@ from firstfix.localizer.replay import replay
 from firstfix.localizer.states import State
 
 
-def test_replay_hands_on_one_input_at_a_time(hall_plan):
+def test_replay_passes_one_input_at_a_time(hall_plan):
     asked = []
 
     def inputs() -> Iterator[Input]:

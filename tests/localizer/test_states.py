@@ -45,7 +45,7 @@ def test_every_state_is_reachable_from_the_start() -> None:
 
 
 @pytest.mark.parametrize("state", sorted(set(State) - {State.NO_MAP}, key=lambda s: s.value))
-def test_no_state_is_a_trap_and_a_map_is_never_lost(state: State) -> None:
+def test_every_state_can_be_left_and_a_map_is_never_lost(state: State) -> None:
     assert reachable(state) == set(State) - {State.NO_MAP}
 
 

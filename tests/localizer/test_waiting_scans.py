@@ -15,7 +15,7 @@ def poses_of(outputs):
     return [output for output in outputs if isinstance(output, (InitialPose, TrackedPose))]
 
 
-def test_odometry_that_lags_by_several_scans_starves_none(robot_in, hall_plan):
+def test_odometry_that_lags_by_several_scans_blocks_none(robot_in, hall_plan):
     robot = robot_in(hall_plan, SE2(1.5, 1.5, 0.0))
     robot.tick()
     lag, tracked = [], []
@@ -29,7 +29,7 @@ def test_odometry_that_lags_by_several_scans_starves_none(robot_in, hall_plan):
     assert len(tracked) == 17
 
 
-def test_what_waits_when_odometry_is_restarted_is_left_out(robot_in, hall_plan):
+def test_scans_that_wait_when_odometry_is_restarted_are_skipped(robot_in, hall_plan):
     robot = robot_in(hall_plan, SE2(1.5, 1.5, 0.0))
     robot.tick()
     robot.stamp += 0.1

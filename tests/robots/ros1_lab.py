@@ -120,7 +120,7 @@ class Program:
         return self._process.returncode
 
     def end(self) -> None:
-        """End it, kindly: roscore and roslaunch see to what they have started."""
+        """End it by SIGINT: roscore and roslaunch end the processes that they started."""
         assert self._process.stdin is not None
         self._process.stdin.close()
         self._process.terminate()
@@ -209,7 +209,7 @@ class Watcher:
         self._program = program
 
     def end(self) -> None:
-        """Listen no longer."""
+        """Stop listening."""
         self._program.end()
 
     def lines(

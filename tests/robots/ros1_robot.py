@@ -95,7 +95,7 @@ class Robot:
         }
 
     def publish(self, topic: str, message: Any) -> None:
-        """Publish as well as the flaws allow, until ROS ends this program."""
+        """Publish, with the flaws, until ROS ends this program."""
         if rospy.is_shutdown():
             sys.exit()
         for flaw in self._flaws:
@@ -134,7 +134,7 @@ class Robot:
             rospy.ServiceProxy(reported["ask"], Empty)()
 
     def listen(self) -> None:
-        """Obey what comes on stdin."""
+        """Execute commands from stdin."""
         for line in sys.stdin:
             self.obey(json.loads(line))
 

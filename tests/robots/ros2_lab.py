@@ -1,4 +1,4 @@
-"""A robot and its friends around a node of ROS 2, over the stand-in for rclpy."""
+"""A robot and other nodes around a node of ROS 2, over the stand-in for rclpy."""
 
 from __future__ import annotations
 

@@ -45,13 +45,13 @@ def test_slashes_around_a_namespace_may_be_missing(namespace):
     assert names_from([], "firstfix", namespace).namespace == "/robot1"
 
 
-def test_rules_for_other_nodes_are_passed_over():
+def test_rules_for_other_nodes_are_ignored():
     names = names_from(["amcl:scan:=a", "firstfix:scan:=b"], "firstfix", "/")
     assert names.resolve("scan") == "/b"
 
 
 @pytest.mark.parametrize("rule", ["scan", "scan=a", ":=a", "scan:=", ""])
-def test_what_is_no_rule_is_refused(rule):
+def test_an_invalid_rule_is_refused(rule):
     with pytest.raises(InputError, match="scan:=base_scan"):
         names_from([rule], "firstfix", "/")
 
@@ -93,7 +93,7 @@ def test_assignments_have_the_types_of_ros():
         ("cloud_rate", "mode:=full"),
     ],
 )
-def test_what_does_not_fit_is_refused(assignment, message):
+def test_values_of_a_wrong_type_are_refused(assignment, message):
     with pytest.raises(InputError, match=message):
         settings([assignment])
 
@@ -125,7 +125,7 @@ def test_later_arguments_count_more(written):
     assert config.mode is Mode.BOOTSTRAP
 
 
-def test_all_of_amcl_comes_over_from_its_file(written):
+def test_all_settings_of_amcl_are_read_from_its_file(written):
     file = written(
         "amcl:\n  ros__parameters:\n    robot_model_type: omnidirectional\n"
         "    set_initial_pose: true\n    initial_pose: {x: 1.0, y: -2.0, yaw: 0.5}\n"

@@ -53,7 +53,7 @@ def test_a_map_of_its_own_needs_none_of_others():
     assert Channel.MAP not in subscribed_topics(NodeConfig(yaml_filename="map.yaml"))
 
 
-def test_what_comes_late_still_gets_maps_and_fixed_transforms():
+def test_late_subscribers_get_maps_and_fixed_transforms():
     topics = subscribed_topics(NodeConfig())
     assert topics[Channel.MAP].delivery is Delivery.LATCHED
     assert topics[Channel.TF_STATIC].delivery is Delivery.LATCHED_MANY

@@ -37,7 +37,7 @@ def test_take_waits_for_a_message():
     assert taken == [7]
 
 
-def test_closing_wakes_the_worker_and_hands_out_nothing_more():
+def test_closing_wakes_the_worker_and_ends_the_queue():
     inbox: Inbox[int] = Inbox()
     taken: list[list[int]] = []
     worker = threading.Thread(target=lambda: taken.append(inbox.take(60.0)))

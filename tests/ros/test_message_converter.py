@@ -102,13 +102,13 @@ def test_a_wrong_base_frame_names_those_that_there_are(robot):
     )
 
 
-def test_a_wrong_frame_of_the_laser_is_another_subject(known, robot):
+def test_a_wrong_frame_of_the_laser_is_a_separate_warning(known, robot):
     assert known.convert(Channel.SCAN, robot.scan("lidar")) == []
     assert "the pose of the laser is unknown: no transform has the frame lidar" in known.last
     assert known.warnings[-1][0] == "the pose of the laser is unknown"
 
 
-def test_a_scan_without_a_stamp_is_the_fault_of_its_driver(known, robot):
+def test_a_scan_without_a_stamp_is_reported_with_its_driver(known, robot):
     robot.stamp = 0.0
     assert known.convert(Channel.SCAN, robot.scan()) == []
     assert known.last == "1 scans dropped so far; a scan has no stamp: its driver must write one"
@@ -138,7 +138,7 @@ def test_a_scan_ahead_of_odometry_by_less_than_a_period_does_not_wait(known, rob
     assert odometry.T_odom_base.distance_to(robot.T_odom_base) < 1e-6
 
 
-def test_a_message_that_is_no_scan_is_an_error_of_ours(known, robot):
+def test_an_invalid_scan_is_an_error_of_ours(known, robot):
     message = robot.scan()
     message.angle_increment = 0.0
     with pytest.raises(ScanError):
@@ -217,7 +217,7 @@ def test_a_clock_set_back_is_a_reset_then_odometry(known, robot):
     assert kinds(known.convert(Channel.SCAN, robot.scan())) == [LaserScan]
 
 
-def test_a_clock_set_back_by_less_than_a_second_costs_one_scan_and_mixes_nothing(known, robot):
+def test_a_clock_set_back_by_less_than_a_second_costs_one_scan_and_mixes_no_odometry(known, robot):
     T_odom_base = robot.T_odom_base
     assert kinds(known.convert(Channel.SCAN, robot.scan())) == [LaserScan]
     robot.stamp, robot.T_odom_base = 99.4, T_odom_base @ SE2(0.2, 0.0, 0.5)
@@ -231,7 +231,7 @@ def test_a_clock_set_back_by_less_than_a_second_costs_one_scan_and_mixes_nothing
     assert kinds(known.convert(Channel.SCAN, robot.scan())) == [LaserScan]
 
 
-def test_scans_that_wait_when_the_clock_is_set_back_are_left_behind(converter, turret):
+def test_scans_that_wait_when_the_clock_is_set_back_are_discarded(converter, turret):
     converter.convert(Channel.TF, turret.mast(99.9))
     converter.convert(Channel.TF, turret.tf())
     assert converter.convert(Channel.SCAN, turret.scan()) == []
@@ -259,7 +259,7 @@ def other_floor(robot):
     return occupancy_grid(robot.wire.make, 2.0, "map", plan.grid())
 
 
-def test_another_map_is_another_floor(converter, robot):
+def test_a_different_map_is_a_new_map(converter, robot):
     converter.convert(Channel.MAP, robot.map())
     assert kinds(converter.convert(Channel.MAP, other_floor(robot))) == [NewMap]
     assert kinds(converter.convert(Channel.MAP, robot.map())) == [NewMap]
@@ -289,7 +289,7 @@ def test_a_map_in_another_frame_is_used_and_reported(converter, robot):
     ]
 
 
-def test_a_message_that_is_no_map_is_an_error_of_ours(converter, robot):
+def test_an_invalid_map_is_an_error_of_ours(converter, robot):
     message = robot.map()
     message.info.width += 1
     with pytest.raises(MapError):
@@ -313,12 +313,12 @@ def test_a_hint_has_the_pose_of_initialpose(converter, robot):
     assert converter.warnings == []
 
 
-def test_a_hint_without_a_stamp_is_of_now(known, robot):
+def test_a_hint_without_a_stamp_gets_the_present_time(known, robot):
     (given,) = known.convert(Channel.INITIAL_POSE, hint(robot, stamp=0.0))
     assert given.stamp == 100.0
 
 
-def test_a_hint_without_a_frame_is_taken_as_amcl_takes_it(converter, robot):
+def test_a_hint_without_a_frame_is_read_as_in_amcl(converter, robot):
     assert kinds(converter.convert(Channel.INITIAL_POSE, hint(robot, ""))) == [PoseHint]
     assert converter.last == "an initial pose names no frame: taken as in map"
 
@@ -328,20 +328,20 @@ def test_a_hint_in_another_frame_is_refused_with_a_remedy(converter, robot):
         converter.convert(Channel.INITIAL_POSE, hint(robot, "odom"))
 
 
-def test_a_hint_that_is_no_pose_is_an_error_of_ours(converter, robot):
+def test_an_invalid_hint_is_an_error_of_ours(converter, robot):
     message = hint(robot)
     message.pose.pose.orientation.w = message.pose.pose.orientation.z = 0.0
     with pytest.raises(InputError):
         converter.convert(Channel.INITIAL_POSE, message)
 
 
-def test_requests_are_of_now(converter, known):
+def test_requests_have_the_present_time(converter, known):
     assert known.convert(Channel.RESET, None) == [Reset(100.0)]
     assert known.convert(Channel.UPDATE, None) == [NoMotionUpdate(100.0)]
     assert Converter().convert(Channel.RESET, None) == [Reset(0.0)]
 
 
-def test_what_needs_no_conversion_is_passed_on(converter, hall_plan):
+def test_inputs_that_need_no_conversion_are_passed_on(converter, hall_plan):
     given = Reset(3.0)
     assert converter.convert(Channel.INPUT, given) == [given]
     assert kinds(converter.convert(Channel.INPUT, NewMap(1.0, hall_plan))) == [NewMap]

@@ -1,4 +1,4 @@
-"""Numbers that no robot would send: errors of ours at most, and afterwards all works as before."""
+"""Invalid messages: errors of ours at most, and afterwards everything works."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_any_message_is_converted_or_raises_an_error_of_ours(ros2, hall_plan, ca
 @pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40)
 @given(st.lists(NUISANCES, max_size=12))
-def test_after_any_nonsense_a_robot_that_reports_well_is_found(ros2, hall_plan, cache, messages):
+def test_after_any_invalid_messages_a_robot_is_found(ros2, hall_plan, cache, messages):
     robot = Speaker(ros2, hall_plan, THERE)
     pair = Pair(cache)
     pair.take(Channel.MAP, robot.map())

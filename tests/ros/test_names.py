@@ -37,7 +37,7 @@ def test_rules_compare_full_names():
 
 
 @pytest.mark.parametrize("name", ["", "1scan", "a b", "a//b", "a/", "/", "~scan", "é", "a\n"])
-def test_what_is_no_name_is_refused(name):
+def test_an_invalid_name_is_refused(name):
     with pytest.raises(InputError, match="letters, digits and underscores"):
         Names().resolve(name)
     with pytest.raises(InputError):

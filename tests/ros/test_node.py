@@ -51,7 +51,7 @@ def test_the_same_in_messages_of_ros_1(run, wire, hall_plan):
     assert to_planar(to_pose(message)).distance_to(THERE) < 0.1
 
 
-def test_its_own_pose_that_comes_back_is_no_hint(run, robot, recorder):
+def test_its_own_pose_is_not_a_hint(run, robot, recorder):
     running = run()
     running.introduce(robot)
     (own,) = wait_for(lambda: recorder.on(INITIAL_POSE))
@@ -101,7 +101,7 @@ def test_a_clock_set_back_is_survived(run, robot, recorder):
 # ---- threads
 
 
-def test_of_a_burst_no_odometry_is_lost_and_the_newest_scan_is_used(run, robot):
+def test_a_burst_loses_no_odometry_and_the_newest_scan_is_used(run, robot):
     running = run(start=False, mode=Mode.FULL)
     running.introduce(robot)
     for i in range(1000):
@@ -148,7 +148,7 @@ def test_it_can_be_stopped_before_between_and_after(run):
     running.receive(Channel.RESET)  # of a callback that came too late
 
 
-def test_the_end_waits_for_what_is_being_thought_and_begins_nothing_more(run, robot):
+def test_stopping_waits_for_the_input_in_progress_and_starts_no_other(run, robot):
     running = run(mode=Mode.FULL)
     running.introduce(robot)
     for _ in range(200):
@@ -161,7 +161,7 @@ def test_the_end_waits_for_what_is_being_thought_and_begins_nothing_more(run, ro
     assert len(running.handled) == handled
 
 
-def test_the_end_does_not_wait_for_ever(run, robot, recorder, monkeypatch):
+def test_stopping_has_a_time_limit(run, robot, recorder, monkeypatch):
     monkeypatch.setattr(node_module, "_STOP_S", 0.05)
     begun, go_on = threading.Event(), threading.Event()
 

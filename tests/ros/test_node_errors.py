@@ -29,7 +29,7 @@ def robot(ros2, hall_plan):
 
 
 class Broken(Recorder):
-    """A wire that is cut for one topic."""
+    """A transport that fails for one topic."""
 
     def publish(self, topic, message):
         if topic is STATUS:
@@ -135,7 +135,9 @@ def test_warnings_come_again_when_their_time_is_over(run, recorder, monkeypatch)
     wait_for(lambda: len(recorder.logged(Severity.WARNING)) == 3)
 
 
-def test_silent_topics_are_named_although_others_speak(run, robot, recorder, monkeypatch):
+def test_topics_without_messages_are_named_although_others_have_some(
+    run, robot, recorder, monkeypatch
+):
     monkeypatch.setattr(node_module, "_SILENCE_S", 0.05)
     running = run()
 

@@ -79,7 +79,7 @@ def status_values(message):
 # ---- poses while tracking
 
 
-def test_bootstrap_hands_over_one_pose_and_nothing_else(recorder):
+def test_bootstrap_publishes_one_initial_pose_and_no_transform(recorder):
     announced(recorder, BOOTSTRAP, found(10.0), tracked(10.1), tracked(10.2), particles=cloud())
     (message,) = recorder.on(INITIAL_POSE)
     reported = to_pose(message)
@@ -90,7 +90,7 @@ def test_bootstrap_hands_over_one_pose_and_nothing_else(recorder):
     assert {topic for topic, _ in recorder.published} == {INITIAL_POSE, LOCALIZED, STATUS}
 
 
-def test_full_follows_the_robot_itself(recorder):
+def test_full_tracks_the_robot_itself(recorder):
     announced(recorder, FULL, found(10.0), tracked(10.5))
     assert recorder.on(INITIAL_POSE) == []
     assert [to_pose(message).stamp for message in recorder.on(AMCL_POSE)] == [10.0, 10.5]
@@ -150,7 +150,7 @@ def test_an_amcl_that_is_restarted_gets_the_pose_again(recorder):
     assert [to_pose(message).stamp for message in recorder.on(INITIAL_POSE)] == [10.0, 14.0]
 
 
-def test_found_elsewhere_is_handed_over_anew(recorder):
+def test_a_pose_found_elsewhere_is_published_again(recorder):
     announced(recorder, BOOTSTRAP, found(10.0), tracked(11.0), found(12.0))
     assert len(recorder.on(INITIAL_POSE)) == 2
 
@@ -216,7 +216,7 @@ def test_places_are_published_and_cleared_when_the_robot_is_found(recorder):
     assert [p.position.x for p in recorder.on(HYPOTHESES)[0].poses] == [0.0, 8.0, 16.0]
 
 
-def test_places_are_taken_back_when_the_search_begins_anew(recorder):
+def test_places_are_cleared_when_the_search_restarts(recorder):
     announced(recorder, FULL, several(10.0, 3), searching(11.0), searching(11.1))
     assert [len(message.poses) for message in recorder.on(HYPOTHESES)] == [3, 0]
     assert status_values(recorder.on(STATUS)[-1])["hypotheses"] == "0"
@@ -294,7 +294,7 @@ def test_the_log_has_changes_and_at_a_low_rate_why_nothing_is_found(recorder):
     ]
 
 
-def test_numbers_that_are_none_break_nothing(recorder):
+def test_nan_and_infinity_do_no_harm(recorder):
     evidence = Evidence(math.nan, math.nan, math.nan, math.nan, 0)
     announced(recorder, FULL, searching(1.0, "", evidence))
     assert status_values(recorder.on(STATUS)[0])["explained"] == "nan"
@@ -303,7 +303,7 @@ def test_numbers_that_are_none_break_nothing(recorder):
 # ---- exact stamps
 
 
-def test_answers_to_a_scan_have_its_stamp_to_the_nanosecond(recorder, ros2):
+def test_outputs_for_a_scan_have_its_stamp_to_the_nanosecond(recorder, ros2):
     """At today's times a float of seconds is off by up to 120 ns."""
     stamps = ExactStamps()
     time = ros2.make("builtin_interfaces/Time", sec=1_764_000_000, nanosec=123_456_789)

@@ -43,7 +43,7 @@ def shared_data() -> dict[str, str]:
     return project["tool"]["hatch"]["build"]["targets"]["wheel"]["shared-data"]
 
 
-def test_all_that_is_shared_is_there_and_nothing_else() -> None:
+def test_all_files_of_ros_are_shared_and_no_others() -> None:
     ours = {str(path.relative_to(ROOT)) for path in ROS.rglob("*") if path.is_file()}
     ours = {name for name in ours if "__pycache__" not in name}
     kept = {"ros/CATKIN_IGNORE", "ros/COLCON_IGNORE", "ros/make_config.py"}
@@ -51,7 +51,7 @@ def test_all_that_is_shared_is_there_and_nothing_else() -> None:
     assert set(shared_data()) <= ours
 
 
-def test_ros_looks_where_things_are() -> None:
+def test_the_files_are_where_ros_expects_them() -> None:
     goals = shared_data()
     assert goals["ros/resource/firstfix"] == "share/ament_index/resource_index/packages/firstfix"
     assert goals["ros/package.xml"] == "share/firstfix/package.xml"
@@ -191,7 +191,7 @@ def test_the_script_starts_the_command_of_its_environment(tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-def test_the_wheel_has_it_all_and_scripts_can_be_executed(tmp_path: Path) -> None:
+def test_the_wheel_is_complete_and_its_scripts_are_executable(tmp_path: Path) -> None:
     pytest.importorskip("hatchling", reason="without hatchling no wheel can be built here")
     quiet = ["--quiet", "--disable-pip-version-check"]
     alone = ["--no-deps", "--no-build-isolation"]

@@ -76,7 +76,7 @@ def fitting(parameter: Parameter):
 
 
 @given(st.data())
-def test_what_fits_arrives(data):
+def test_valid_values_reach_the_config(data):
     names = data.draw(st.lists(st.sampled_from(sorted(BY_NAME)), unique=True, max_size=5))
     values = {name: data.draw(fitting(BY_NAME[name])) for name in names}
     assume(values.get("min_particles", 500) <= values.get("max_particles", 2000))
@@ -137,7 +137,7 @@ def test_models_of_nav2_until_foxy_are_known_as_in_a_file():
     assert config.localizer.amcl.robot_model_type is MotionModel.OMNIDIRECTIONAL
 
 
-def test_what_every_node_has_is_passed_over():
+def test_parameters_of_every_node_are_ignored():
     values = dict.fromkeys(IGNORED, "anything") | {"qos_overrides./tf.publisher.depth": 5}
     assert configured(values) == NodeConfig()
 
@@ -150,7 +150,7 @@ def test_names_of_ros_1_come_with_their_remedy(name):
         assert NEW_NAMES[name] in str(caught.value)
 
 
-def test_a_name_that_is_nearly_right_comes_with_the_right_one():
+def test_the_error_of_a_misspelled_name_suggests_the_right_one():
     with pytest.raises(InputError, match="received max_particle; the nearest is max_particles"):
         configured({"max_particle": 100})
     with pytest.raises(InputError, match="received zzzz; remove it"):
@@ -206,7 +206,7 @@ NAMES = st.text(max_size=8) | st.sampled_from([*BY_NAME, *NEW_NAMES, "initial_po
 
 
 @given(st.dictionaries(NAMES, ANYTHING, max_size=3))
-def test_whatever_comes_there_are_settings_or_an_error_of_ours(values):
+def test_any_file_gives_settings_or_an_error_of_ours(values):
     try:
         config = configured(values)
     except InputError:
@@ -230,7 +230,7 @@ def test_flat_names_lead_to_the_values_of_the_tree(tree):
         assert not isinstance(value, dict)
 
 
-def test_parameters_mean_what_they_mean_in_a_file(tmp_path: Path):
+def test_parameters_have_the_meaning_of_those_in_a_file(tmp_path: Path):
     """One YAML for the node and for `firstfix track --params`."""
     text = (
         "alpha1: 0.3\nmax_beams: 90\nrobot_model_type: differential\ntf_broadcast: false\n"

@@ -44,11 +44,11 @@ def test_without_a_rate_a_pose_is_written_on_request(file, rate_hz):
     assert load_pose(file).stamp == 5.0
 
 
-def test_a_clock_set_back_begins_the_pause_anew(file):
+def test_a_clock_set_back_restarts_the_interval(file):
     assert offered(file, 1.0, [100.0, 101.0, 5.0, 5.5, 6.0]) == [101.0, 6.0]
 
 
-def test_a_pose_saved_at_once_begins_the_pause_anew(file):
+def test_a_pose_saved_at_once_restarts_the_interval(file):
     keeper = PoseKeeper(file, 1.0)
     keeper.save(pose_at(10.0))
     keeper.offer(pose_at(10.5))
@@ -63,7 +63,7 @@ def test_a_pose_can_be_withdrawn_whether_there_is_one_or_not(file):
     assert not file.exists()
 
 
-def test_what_cannot_be_written_or_removed_is_an_error_of_ours(tmp_path):
+def test_a_file_that_cannot_be_written_or_removed_is_an_error_of_ours(tmp_path):
     folder = PoseKeeper(tmp_path, 1.0)
     for act in (lambda: folder.save(pose_at(1.0)), folder.withdraw):
         with pytest.raises(InputError):
@@ -117,7 +117,7 @@ def test_a_disk_that_became_read_only_keeps_the_pose_and_is_reported(on_small_di
     on_small_disk(READ_ONLY)
 
 
-def test_a_folder_in_place_of_the_file_is_left_alone(tmp_path):
+def test_a_folder_in_place_of_the_file_is_unchanged(tmp_path):
     (tmp_path / "pose.json").mkdir()
     (tmp_path / "pose.json" / "inside").touch()
     keeper = PoseKeeper(tmp_path / "pose.json", 1.0)

@@ -1,4 +1,4 @@
-"""What a node knows of its place before the first scan, and what it keeps for the next start."""
+"""The pose of a node before the first scan, and the pose kept for the next start."""
 
 import threading
 
@@ -90,7 +90,7 @@ def test_the_pose_is_kept_at_the_rate(memory_of, hall_plan, file):
     assert not memory._disk._shutdown
 
 
-def test_a_pose_that_does_not_hold_any_more_is_not_kept(memory_of, hall_plan, file):
+def test_an_invalid_pose_is_not_kept(memory_of, hall_plan, file):
     memory = memory_of(save_pose_rate=10.0)
     memory.hint_after(NewMap(0.0, hall_plan))
     memory.keep(localized(10.0))
@@ -122,7 +122,7 @@ def test_without_a_file_nothing_is_kept(memory_of, tmp_path, hall_plan, monkeypa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_slow_disk_holds_nothing_up(memory_of, hall_plan, monkeypatch):
+def test_a_slow_disk_delays_no_scan(memory_of, hall_plan, monkeypatch):
     go_on, begun, written = threading.Event(), threading.Event(), []
 
     def save(keeper, pose):
@@ -225,7 +225,7 @@ def test_a_broken_file_is_reported_in_one_line_and_left_unchanged(
     assert file.read_bytes() == content
 
 
-def test_at_the_very_first_start_there_is_none(memory_of, hall_plan, file, lines):
+def test_at_the_first_start_there_is_no_saved_pose(memory_of, hall_plan, file, lines):
     assert at_start(memory_of(), hall_plan) is None
     assert lines == [(Severity.INFO, f"no saved pose in {file} yet")]
 
@@ -262,7 +262,7 @@ def test_a_saved_pose_comes_before_initial_pose_and_that_before_nothing(memory_o
     assert at_start(memory_of(initial_pose=THERE, path=""), hall_plan) is None
 
 
-def test_the_word_of_a_person_comes_before_all(memory_of, hall_plan, file):
+def test_a_hint_of_a_person_takes_precedence(memory_of, hall_plan, file):
     save_pose(file, saved(hall_plan))
     memory = memory_of()
     memory.hint_after(NewMap(0.0, hall_plan))
@@ -305,7 +305,7 @@ class Life:
         self._node.stop()
 
     def look(self):
-        """Let the robot report, and wait until the node has thought about it."""
+        """Let the robot report, and wait until the node has processed it."""
         self._robot.move()
         self._looked.clear()
         self._robot.report(self._node.receive)
@@ -353,7 +353,7 @@ def test_a_robot_that_was_pushed_a_little_meanwhile_is_found_there(ros2, file):
 
 
 def test_a_saved_pose_that_is_wrong_does_not_win(ros2, hall_plan, file):
-    """Somebody carried the robot while it was off."""
+    """The robot was carried while it was off."""
     robot = Speaker(ros2, hall_plan, THERE)
     save_pose(file, saved(hall_plan, 90.0, SE2(7.5, 1.0, -2.0), robot.T_odom_base))
     with Life(ros2, robot, file) as life:
@@ -381,7 +381,7 @@ def test_initial_pose_decides_between_equal_rooms(ros2, tmp_path):
         assert life.reason.startswith("LOCALIZED: chosen by initial_pose; ")
 
 
-def test_a_node_goes_on_where_nothing_can_be_saved(ros2, hall_plan, tmp_path):
+def test_a_node_continues_where_poses_cannot_be_saved(ros2, hall_plan, tmp_path):
     robot = Speaker(ros2, hall_plan, THERE)
     with Life(ros2, robot, tmp_path / "no" / "folder" / "pose.json") as life:
         for _ in range(6):

@@ -29,7 +29,7 @@ def test_the_domain_is_that_of_ros():
 
 
 @pytest.mark.parametrize("text", ["-1", "233", "x", "1.5", "²", "9" * 5000])
-def test_what_is_no_domain_is_refused(text):
+def test_an_invalid_domain_is_refused(text):
     with pytest.raises(InputError, match="ROS_DOMAIN_ID from 0 to 232"):
         domain_settings({"ROS_DOMAIN_ID": text})
 
@@ -86,7 +86,7 @@ def test_a_range_that_does_not_exist_is_refused():
         domain_settings({"ROS_AUTOMATIC_DISCOVERY_RANGE": "MOON"})
 
 
-def test_the_users_own_configuration_has_the_last_word():
+def test_the_users_own_configuration_takes_precedence():
     text = domain_settings({"CYCLONEDDS_URI": "file:///etc/mine.xml"}).configuration
     assert text.endswith("</CycloneDDS>,file:///etc/mine.xml")
 

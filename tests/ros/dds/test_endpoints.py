@@ -25,7 +25,7 @@ def matched(sender):
     return sender.entity.get_matched_subscriptions
 
 
-def test_what_is_sent_arrives_elsewhere_and_not_here(dds, other):
+def test_messages_arrive_at_others_and_not_at_the_sender(dds, other):
     sender = Sender(dds.participant, RELIABLE, "rt/flag")
     here = Receiver(dds.participant, RELIABLE, "rt/flag")
     there = Receiver(other, RELIABLE, "rt/flag")
@@ -101,7 +101,7 @@ def test_compatible_ends_report_nothing(dds, other):
     assert (sender.check_matches(), receiver.check_matches()) == (None, None)
 
 
-def test_listeners_count_when_they_have_had_time_to_find_the_sender(dds, other, monkeypatch):
+def test_subscribers_count_after_the_time_of_discovery(dds, other, monkeypatch):
     sender = Sender(dds.participant, RELIABLE, "rt/flag")
     receiver = Receiver(other, RELIABLE, "rt/flag")
     wait_for(matched(sender))
@@ -125,7 +125,7 @@ def test_domains_are_separate(dds):
     del elsewhere
 
 
-def test_a_watch_looks_at_news_and_survives_a_fault(dds, other):
+def test_a_callback_is_called_for_each_message_and_its_error_is_survived(dds, other):
     sender = Sender(dds.participant, RELIABLE, "rt/flag")
     receiver = Receiver(other, RELIABLE, "rt/flag")
     received, complaints = [], []

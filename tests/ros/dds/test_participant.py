@@ -44,7 +44,7 @@ def assert_near(truth, pose, metres, radians):
 
 
 @pytest.mark.slow
-def test_a_robot_at_rest_is_found_and_its_pose_handed_over_once(dds):
+def test_a_robot_at_rest_is_found_and_its_pose_published_once(dds):
     poses = dds.ear("/initialpose", POSE)
     dds.robot("stand")
     node = dds.node()
@@ -70,7 +70,7 @@ def test_a_robot_at_rest_is_found_and_its_pose_handed_over_once(dds):
 
 
 @pytest.mark.slow
-def test_nothing_is_handed_over_where_places_look_alike(dds):
+def test_no_pose_is_published_where_places_look_alike(dds):
     poses = dds.ear("/initialpose", POSE)
     places = dds.ear("/hypotheses", "geometry_msgs/PoseArray")
     status = dds.ear("/localization_status", STATUS)
@@ -133,7 +133,7 @@ def impostor(dds, topic, kind, size):
 
 
 @pytest.mark.slow
-def test_nonsense_on_the_wire_does_not_end_the_node(dds):
+def test_invalid_data_on_the_wire_does_not_end_the_node(dds):
     rng = np.random.default_rng(0)
     kinds = {"/scan": "sensor_msgs.msg.dds_.LaserScan_", "/tf": "tf2_msgs.msg.dds_.TFMessage_"}
     node = dds.node()

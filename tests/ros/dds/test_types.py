@@ -89,7 +89,7 @@ def test_messages_are_read_as_they_were_written(kind, rosbags_own):
     assert encode(kind, decode(kind, bytes(other_order))) == data
 
 
-def test_what_was_meant_arrives():
+def test_messages_arrive_unchanged():
     grid = to_grid(decode("nav_msgs/OccupancyGrid", encode(*only("nav_msgs/OccupancyGrid"))))
     assert grid.cells.tolist() == [[0, 1, 2], [3, 4, 5]]
     assert grid.T_map_grid.x == POSE.x
@@ -123,7 +123,7 @@ def test_a_message_that_was_cut_off_is_an_error_of_ours(kind):
 
 
 @given(st.sampled_from(sorted(MADE)), st.binary(max_size=300), st.binary(min_size=4, max_size=4))
-def test_nonsense_is_a_message_or_an_error_of_ours(kind, data, head):
+def test_random_bytes_are_a_message_or_an_error_of_ours(kind, data, head):
     for start in (head, b"\0\1\0\0", b"\0\0\0\0"):
         with contextlib.suppress(InputError):
             decode(kind, start + data)

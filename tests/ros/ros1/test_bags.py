@@ -21,9 +21,7 @@ def player(ros1: Lab) -> Lab:
     return ros1
 
 
-def test_a_bag_that_begins_anew_is_noticed_and_the_robot_found_again(
-    player: Lab, tmp_path: Path
-) -> None:
+def test_a_restarted_bag_is_detected_and_the_robot_found_again(player: Lab, tmp_path: Path) -> None:
     truth = record(tmp_path / "stand.bag", "stand", seconds=6.0, began=1000.0)
     watcher = player.watch("initialpose")
     node = player.node()

@@ -1,4 +1,4 @@
-"""A node of ROS 1 that is killed, and knows its place when it comes back."""
+"""A node of ROS 1 that is killed, and finds its place after a restart."""
 
 from __future__ import annotations
 

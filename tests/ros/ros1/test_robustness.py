@@ -39,7 +39,7 @@ def test_missing_topics_are_reported_and_awaited(ros1: Lab) -> None:
 
 
 def assert_throttled(node: Program) -> None:
-    """See to it that no sentence comes again within ten seconds."""
+    """Check that no warning is repeated within ten seconds."""
     said_at: dict[str, float] = {}
     for stamp, text in re.findall(r"\[WARN\] \[([\d.]+)\]: (.*)", node.output):
         about = re.sub(r"\d+", "", text)[:50]
@@ -59,7 +59,7 @@ def test_a_base_frame_without_transforms_is_reported_with_the_known_frames(ros1:
     assert node.wait() == 0
 
 
-def test_a_node_that_was_killed_finds_the_robot_again_and_signals_end_it_well(ros1: Lab) -> None:
+def test_a_restarted_node_finds_the_robot_and_signals_end_it_cleanly(ros1: Lab) -> None:
     watcher = ros1.watch("initialpose")
     node = ros1.node()
     ros1.robot("stand")
@@ -75,7 +75,7 @@ def test_a_node_that_was_killed_finds_the_robot_again_and_signals_end_it_well(ro
         assert "Traceback" not in node.output
 
 
-def test_a_node_ends_well_while_its_kernels_are_compiled(ros1: Lab, tmp_path: Path) -> None:
+def test_a_node_ends_cleanly_while_its_kernels_are_compiled(ros1: Lab, tmp_path: Path) -> None:
     ros1.master.environment["NUMBA_CACHE_DIR"] = str(tmp_path / "nothing compiled yet")
     node = ros1.node("_mode:=full")
     wait_until(lambda: ros1.master.publishers("/amcl_pose"), lambda: node.output)
@@ -121,7 +121,7 @@ def test_the_node_registers_again_with_another_master(ros1: Lab) -> None:
     assert "Traceback" not in node.output
 
 
-def test_a_parameter_that_cannot_be_used_ends_the_node_with_a_sentence(ros1: Lab) -> None:
+def test_an_unusable_parameter_ends_the_node_with_one_sentence(ros1: Lab) -> None:
     nodes = [
         (ros1.node(f"__name:=node{i}", argument), expected)
         for i, (argument, expected) in enumerate(

@@ -92,7 +92,9 @@ def test_without_nav2_msgs_clouds_are_poses(
     assert "set_initial_pose" not in lab.world.services
 
 
-def test_it_is_silent_and_deaf_unless_active(lab: Lab, hall_plan: OccupancyGrid) -> None:
+def test_an_inactive_node_publishes_and_receives_nothing(
+    lab: Lab, hall_plan: OccupancyGrid
+) -> None:
     node = lab.node("-p", "mode:=full")
     robot = Robot(lab, hall_plan, HERE)
     poses = lab.subscribe("amcl_pose", POSE, is_latched=True)
@@ -134,7 +136,7 @@ def test_only_an_active_node_misses_scans(lab: Lab, monkeypatch: pytest.MonkeyPa
     wait_until(lambda: any("no message on scan" in w for w in lab.world.lines("warning")))
 
 
-def test_all_is_given_back_and_it_can_be_configured_anew(
+def test_cleanup_releases_all_and_the_node_can_be_configured_again(
     lab: Lab, hall_plan: OccupancyGrid
 ) -> None:
     node = lab.node()
@@ -177,14 +179,14 @@ def test_a_bad_parameter_is_reported_in_one_line(lab: Lab, given: str, words: st
     assert lab.world.ends == []
 
 
-def test_a_bad_parameter_can_be_put_right(lab: Lab) -> None:
+def test_a_bad_parameter_can_be_corrected(lab: Lab) -> None:
     node = lab.node("-p", "max_beams:=1")
     node.trigger_configure()
     node.set_parameter("max_beams", 30)
     assert succeeds(lab, node.trigger_configure())
 
 
-def test_whole_numbers_stand_for_lengths(lab: Lab) -> None:
+def test_integers_are_accepted_for_lengths(lab: Lab) -> None:
     node = lab.node("-p", "laser_max_range:=12")
     assert succeeds(lab, node.trigger_configure())
 
@@ -276,7 +278,7 @@ def test_an_impossible_transition_does_not_end_it(lab: Lab) -> None:
     "given",
     [["-p", "mode:=full"], ["_mode:=full"], ["--ros-args", "-p", "mode"], ["--ros-args", "-x"]],
 )
-def test_run_refuses_what_ros_would_pass_over(lab: Lab, given: list[str]) -> None:
+def test_run_refuses_arguments_that_ros_would_ignore(lab: Lab, given: list[str]) -> None:
     with pytest.raises(InputError, match="--ros-args"):
         lab.ros2.run(given)
     assert not lab.rclpy.ok()
@@ -350,7 +352,7 @@ def test_a_bad_bond_timeout_is_reported_in_one_line(lab: Lab) -> None:
 # ---- memory
 
 
-def test_what_is_cleaned_up_is_freed(lab: Lab, hall_plan: OccupancyGrid) -> None:
+def test_cleanup_frees_memory(lab: Lab, hall_plan: OccupancyGrid) -> None:
     """Without waiting for the collector of cycles, which arrays of 25 MB do not trigger."""
     node = lab.node("-p", "mode:=full")
     robot = Robot(lab, hall_plan, HERE)

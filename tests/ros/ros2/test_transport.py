@@ -79,7 +79,7 @@ def test_a_person_can_give_a_hint(lab: Lab, states, way: str) -> None:
     robot.look_until(lambda: any(message is not hint and is_there(message) for message in reported))
 
 
-def test_a_wheel_that_drops_makes_it_search(lab: Lab, states) -> None:
+def test_a_wheel_drop_restarts_the_search(lab: Lab, states) -> None:
     robot, received = states
     reported = lab.subscribe("initialpose", POSE)
     wheel = lab.advertise("events/wheel_drop", "kobuki/WheelDropEvent")
@@ -105,7 +105,7 @@ def test_a_transport_logs_with_every_gravity(lab: Lab) -> None:
     assert [how for how, _ in lab.world.log] == ["info", "warning", "error"] * 2
 
 
-def test_what_is_thought_too_late_is_dropped(lab: Lab) -> None:
+def test_messages_after_the_end_are_dropped(lab: Lab) -> None:
     transport = importlib.import_module("firstfix.ros.ros2.transport")
     config = NodeConfig()
     made = transport.Ros2(lab.node(), config)
@@ -121,7 +121,7 @@ def test_what_is_thought_too_late_is_dropped(lab: Lab) -> None:
     assert again.subscriber_count(topic) == 0
 
 
-def test_qualities_are_those_that_others_use(lab: Lab) -> None:
+def test_qualities_of_service_are_those_of_nav2(lab: Lab) -> None:
     config = NodeConfig()
     topics = [*subscribed_topics(config).values(), *published_topics(config, PARTICLES)]
     found = {}
