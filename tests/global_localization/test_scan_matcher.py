@@ -43,6 +43,30 @@ def test_any_place_of_the_office_is_found_and_published(seed, office_locator, fo
     assert found(result, truth, 0.05, 0.5)
 
 
+@pytest.mark.parametrize(
+    ("degrees", "range_max", "verdict"),
+    [
+        (360.0, 8.0, Verdict.UNIQUE),
+        (180.0, 12.0, Verdict.UNIQUE),
+        (360.0, 3.5, Verdict.AMBIGUOUS),
+        (120.0, 8.0, Verdict.AMBIGUOUS),
+        (60.0, 5.0, Verdict.AMBIGUOUS),
+    ],
+)
+def test_one_scan_of_a_sensor_that_sees_little_never_decides(
+    degrees, range_max, verdict, office_locator
+):
+    lidar = Lidar(beams=180, fov=math.radians(degrees), range_max=range_max, sigma_m=0.01)
+    rng, grid = np.random.default_rng(3), office_locator.fields.grid
+    pose = random_free_pose(grid, rng)
+    results = [
+        office_locator.locate(lidar.scan(grid, pose @ SE2(0, 0, turn), rng)) for turn in range(6)
+    ]
+    assert verdict in [result.verdict for result in results]
+    if verdict is Verdict.AMBIGUOUS:
+        assert all(result.verdict is not Verdict.UNIQUE for result in results)
+
+
 def test_what_a_result_promises(office_locator):
     rng = np.random.default_rng(100)
     grid = office_locator.fields.grid

@@ -26,7 +26,13 @@ from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.scoring import score_poses, search_locally
 from firstfix.global_localization.search import search
 from firstfix.global_localization.searchable import check_positions, check_searchable
-from firstfix.global_localization.sensors import as_scans, at_one_time, instants, joint_beams
+from firstfix.global_localization.sensors import (
+    as_scans,
+    at_one_time,
+    instants,
+    joint_beams,
+    see_enough,
+)
 from firstfix.global_localization.verdict import judge, nothing_to_match, place_probabilities
 from firstfix.global_localization.verify import Verification, verified_place, verify
 
@@ -37,6 +43,11 @@ SECOND_LOOK_PLACES = 48
 # This many places are listed however unlikely, and all that are a hundredth as likely as the best.
 LISTED_PLACES = 10
 _LISTED_SHARE = 0.01
+
+_SEES_TOO_LITTLE = (
+    "but one scan of a sensor with this field of view and range is not enough to be sure: "
+    "drive half a metre or turn, and give several scans"
+)
 
 
 class ScanMatcher:
@@ -256,6 +267,9 @@ def locate(
         for i, probability in zip(ranked, probabilities, strict=True)
     )
     verdict, reason = _judge(verification, ranked, probabilities, report, config)
+    # A prior is a second witness.
+    if verdict is Verdict.UNIQUE and prior is None and not see_enough(scans):
+        verdict, reason = Verdict.AMBIGUOUS, f"{reason}, {_SEES_TOO_LITTLE}"
     result = LocateResult(verdict, reason, hypotheses, report, 0.0, scans=tuple(scans))
     if prior is not None:
         by_scan = place_probabilities(verification.scores[ranked], len(beams))

@@ -11,12 +11,17 @@ from firstfix.core.arguments import as_instance, as_pose
 from firstfix.core.errors import InputError
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.global_localization.beams import Beams, usable_beams
+from firstfix.global_localization.beams import LONGEST_M, Beams, usable_beams
 
 # Odometry is taken at its word between the scans of one observation: a short way only.
 MOST_MOTION_M = 1.0
 
 _SAME_DIRECTION_RAD = 0.1
+
+# A sensor that covers this area sees enough for one scan to decide. UNIQUE answers to single scans,
+# cut to smaller sensors, are wrong in 0.3 % at 360 degrees x 8 m (201 m²), in 0.6 % at 180 degrees
+# x 8 m (100 m²), in 1.5 % at 360 degrees x 3.5 m (38 m²) and in 5 % at 60 degrees x 5 m (13 m²).
+_ENOUGH_M2 = 150.0
 
 
 def as_scans(scans: LaserScan | Sequence[LaserScan]) -> tuple[LaserScan, ...]:
@@ -142,3 +147,14 @@ def joint_beams(scans: Sequence[LaserScan]) -> tuple[LaserScan, Beams]:
 def _by_hits_and_place(scan: LaserScan) -> tuple[float, ...]:
     # The place decides between equals, so that the order of the scans never counts.
     return -float(np.count_nonzero(scan.hit)), *scan.T_base_laser, float(scan.bearings[0])
+
+
+def covered_angle(scan: LaserScan) -> float:
+    """Return the angle in which a scan has valid beams, with or without a return, rad."""
+    return abs(scan.angle_increment) * int(np.count_nonzero(scan.hit | scan.no_return))
+
+
+def see_enough(scans: Sequence[LaserScan]) -> bool:
+    """Tell whether sensors cover so much that one scan of each can be enough for UNIQUE."""
+    area = sum(0.5 * covered_angle(s) * min(s.range_max, LONGEST_M) ** 2 for s in scans)
+    return area >= _ENOUGH_M2
