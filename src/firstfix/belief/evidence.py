@@ -15,8 +15,8 @@ from firstfix.core.angles import angle_error
 # number of independent views, slowly: what is wrong in the map is wrong in several views. All of
 # these are chosen by leaving out one of nine buildings at a time, over four sensors; around them,
 # nothing changes much.
-EXPONENT = 14.0
-EXPONENT_GROWTH = 0.75
+EXPONENT = 12.0
+EXPONENT_GROWTH = 0.5
 FLOOR = 0.3
 BEAMS_FOR_EXPONENT = 30
 
