@@ -51,7 +51,7 @@ def test_without_nothing_it_is_the_default_method(
     blind = LaserScan(np.full(90, np.inf), 0.0, 0.07, 0.1, 12.0)
     cases = [(whole, scan, fields) for scan in [*scans, blind]]
     for matcher, scan, prepared in [*cases, (AblatedMatcher(alike, Without.NOTHING), twin, alike)]:
-        ours, theirs = matcher.locate(scan), locate(scan, prepared, LocateConfig())
+        ours, theirs = matcher.locate(scan), locate((scan,), prepared, LocateConfig())
         assert (ours.verdict, ours.reason) == (theirs.verdict, theirs.reason)
         assert ours.search == theirs.search
         assert len(ours.hypotheses) == len(theirs.hypotheses)
