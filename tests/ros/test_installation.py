@@ -32,14 +32,16 @@ sys.meta_path.insert(0, Absent())
 
 NODE = """
 import time
-from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 
+from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.fields.raycast import expected_ranges
 from firstfix.io.ros_messages.incoming import to_planar, to_pose
 from firstfix.io.ros_messages.outgoing import laser_scan, occupancy_grid, transforms
-from firstfix.localizer.precompile import scan_of, small_room
+from firstfix.localizer.precompile import small_room
 from firstfix.ros.channels import INITIAL_POSE, PARTICLES, STATUS, Channel
 from firstfix.ros.node import Node
 from firstfix.ros.node_config import NodeConfig
@@ -64,7 +66,10 @@ class Transport:
 
 transport = Transport()
 make, grid, pose = transport.make, small_room(), SE2(3.0, 2.5, 0.4)
-scan = replace(scan_of(grid, pose), stamp=1.0)
+# A sensor that sees the whole room: one scan of a short one is never enough.
+bearings = np.radians(np.arange(360.0))
+ranges = expected_ranges(grid, pose, bearings, 12.0).astype(np.float32)
+scan = LaserScan(ranges, 0.0, float(bearings[1]), range_min=0.1, range_max=12.0, stamp=1.0)
 node = Node(NodeConfig(), transport)
 node.start()
 node.receive(Channel.MAP, occupancy_grid(make, 1.0, "map", grid))
