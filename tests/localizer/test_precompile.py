@@ -7,7 +7,11 @@ from pathlib import Path
 import pytest
 
 from firstfix.amcl.config import AmclConfig, MotionModel, SensorModel
+from firstfix.localizer.inputs import Input
+from firstfix.localizer.localizer import Localizer
+from firstfix.localizer.outputs import Output
 from firstfix.localizer.precompile import precompile
+from firstfix.localizer.states import State
 
 # A robot is found in a hall, driven, lost and found again, and then in one of two equal rooms.
 STORY = """
@@ -65,6 +69,21 @@ def test_it_returns_nothing_and_leaves_no_file(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setenv("FIRSTFIX_CACHE_DIR", str(tmp_path))
     assert precompile(AmclConfig()) is None
     assert list(tmp_path.iterdir()) == []
+
+
+def test_its_story_passes_through_finding_tracking_and_doubt(monkeypatch: pytest.MonkeyPatch):
+    """Or kernels of one of them would be left to the first scans of a robot."""
+    states, handle = set(), Localizer.handle
+
+    def record(localizer: Localizer, given: Input) -> list[Output]:
+        outputs = handle(localizer, given)
+        states.add(localizer.state)
+        return outputs
+
+    monkeypatch.setattr(Localizer, "handle", record)
+    precompile()
+    found = {State.LOCALIZED, State.DISAMBIGUATING, State.SEARCHING, State.VERIFYING_HINT}
+    assert found <= states
 
 
 @pytest.mark.slow
