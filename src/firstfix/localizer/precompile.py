@@ -63,9 +63,9 @@ def precompile(config: AmclConfig | None = None, methods: Iterable[Method] = ())
 
 def _search_again(localizer: Localizer, grid: OccupancyGrid) -> None:
     """Let several places fit, and verify a hint of one."""
-    for i, given in enumerate((Reset(0.0), PoseHint(0.0, _HERE)), _SCANS):
+    for i in (_SCANS, _SCANS + 1):
         stamp = i * _STEP_S
-        localizer.handle(replace(given, stamp=stamp))
+        localizer.handle(Reset(stamp) if i == _SCANS else PoseHint(stamp, _HERE))
         localizer.handle(Odometry(stamp, SE2(0.05 * i, 0.0, 0.0)))
         localizer.handle(replace(scan_of(grid, _HERE), range_max=_SHORT_RANGE, stamp=stamp))
 
