@@ -14,15 +14,15 @@ from firstfix.localizer.states import State
 
 HERE = SE2(4.0, 3.0, 1.0)  # where `in_hall` stands
 IN_A_ROOM = SE2(10.5, 1.2, 0.3)
-BEHIND = SE2(2.5, 2.0, 0.0)  # in `two_rooms`, looking away from what differs
+BEHIND = SE2(2.5, 2.0, 0.0)  # in `two_rooms`, facing away from what differs
 A_STEP, A_TURN = SE2(0.05, 0.0, 0.05), SE2(0.0, 0.0, 0.1)
 
 
-# ---- found at once, and followed
+# ---- found at once, and tracked
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_first_scan_finds_the_robot_and_every_other_follows_it(
+def test_the_first_scan_finds_the_robot_and_all_others_track_it(
     robot_in, office, seed, of, kinds, poses, is_at, office_poses
 ):
     robot = robot_in(office, office_poses(office, 1, seed)[0], seed=seed)
@@ -123,7 +123,7 @@ def test_identical_places_are_listed_and_none_is_published(robot_in, three_rooms
 
 @pytest.mark.parametrize("room", [0.0, 7.0])
 @pytest.mark.parametrize("seed", range(2))
-def test_the_motion_that_is_asked_for_decides(
+def test_the_requested_motion_decides(
     robot_in, two_rooms, half_lidar, room, seed, of, kinds, poses, is_at
 ):
     robot = robot_in(two_rooms, SE2(room, 0.0, 0.0) @ BEHIND, lidar=half_lidar, seed=seed)

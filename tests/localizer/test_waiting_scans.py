@@ -122,7 +122,7 @@ def test_a_robot_that_landed_before_its_map_came(hall_plan):
 def test_a_robot_that_landed_before_the_clock_was_set_back_is_found_by_the_new_time(
     robot_in, hall_plan
 ):
-    """Else it would be blind until the old time has come again."""
+    """Otherwise it would ignore all scans until the old time comes again."""
     robot = robot_in(hall_plan, SE2(1.5, 1.5, 0.0))
     robot.tick()
     lifted(robot, active=True)

@@ -51,7 +51,7 @@ def deciding_motion(
     Parameters
     ----------
     scan : LaserScan
-        The scan that left the places open: it tells what the sensor can see.
+        The scan that left the places open. It has the field of view and range of the sensor.
     places : sequence of Hypothesis
         Most likely first; the first eight that are rivals of the best are compared.
     grid : OccupancyGrid

@@ -1,4 +1,4 @@
-"""What can happen to a localizer; every input carries its own time."""
+"""The inputs of a localizer; each carries its own time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from firstfix.core.se2 import SE2
 
 @dataclass(frozen=True, eq=False, slots=True)
 class NewMap:
-    """The map, or another one: another floor.
+    """The map; a later one replaces it.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class PoseHint:
 
 @dataclass(frozen=True, slots=True)
 class Reset:
-    """Forget where the robot is, and search.
+    """Discard the pose and everything seen so far, and search.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ class Localizer:
     config : LocalizerConfig, optional
         Settings.
     cache_dir : Path, optional
-        Folder of prepared maps; by default every map is prepared anew.
+        Folder of prepared maps; by default nothing is cached.
 
     Examples
     --------
@@ -145,9 +145,8 @@ class Localizer:
     def _take_map(self, given: NewMap) -> list[Output]:
         matcher = ScanMatcher(given.grid, config=self.config.locate, cache_dir=self._cache_dir)
         self._tracker = PoseTracker(matcher, self.config, self._rng)
-        self._places = PlaceBelief(
-            matcher.fields, self.config.belief, self.config.monitor.rest_period_s
-        )
+        pause = self.config.monitor.rest_period_s
+        self._places = PlaceBelief(matcher.fields, self.config.belief, pause)
         self._matcher = matcher
         status = self._restart(given.stamp, Event.MAP_RECEIVED, "map received: searching")
         if not self._lifted:
@@ -256,8 +255,8 @@ class Localizer:
             return [self._status(scan.stamp, reason)]
         verdict, places = self._places.belief.verdict, self._places.places
         if verdict is Verdict.UNIQUE and hint.matches(places[0].pose):
-            fit = f"{places[0].evidence.explained:.0%} of the beams fit"
-            reason = f"{hint.source} proposed this pose; {fit}"
+            explained = places[0].evidence.explained
+            reason = f"{hint.source} proposed this pose; {explained:.0%} of the beams fit"
             return self._arrive(scan, T_odom_base, places[0], Event.HINT_CONFIRMED, reason)
         if verdict is Verdict.AMBIGUOUS and any(hint.matches(place.pose) for place in places):
             self._fire(Event.SEVERAL_PLACES_FIT)
@@ -269,8 +268,8 @@ class Localizer:
         tracked = self._tracker.follow(scan, T_odom_base, force_update=self._update_requested)
         self._update_requested = False
         place, fit = tracked.judgement.place, tracked.judgement.fit
-        away = place.pose.distance_to(tracked.pose.T_map_base)
         if fit is Fit.ELSEWHERE:
+            away = place.pose.distance_to(tracked.pose.T_map_base)
             if not is_same_place(place.pose, tracked.pose.T_map_base):
                 reason = f"found {away:.1f} m from the tracked pose"
                 return self._arrive(scan, T_odom_base, place, Event.RELOCALIZED, reason)
@@ -287,7 +286,7 @@ class Localizer:
         revised = self._reconsider(scan, T_odom_base, tracked)
         if revised:
             return revised
-        reason = self._choice() or tracked.fit_in_words
+        reason = self._unless_chosen(tracked.fit_in_words)
         return [tracked.pose, self._status(scan.stamp, reason, place.evidence)]
 
     def _reconsider(self, scan: LaserScan, T_odom_base: SE2, tracked: Tracked) -> list[Output]:
@@ -302,9 +301,8 @@ class Localizer:
         if support is Support.SAME_PLACE and self._places.is_decided_by_evidence:
             self._chosen_by = None
         if support is Support.OTHER_PLACE:
-            best = self._places.places[0]
-            away = best.pose.distance_to(T_map_base)
-            reason = f"{away:.1f} m from the tracked pose {self._places.belief.reason}"
+            best, reason = self._places.places[0], self._places.belief.reason
+            reason = f"{best.pose.distance_to(T_map_base):.1f} m from the tracked pose {reason}"
             return self._arrive(scan, T_odom_base, best, Event.RELOCALIZED, reason)
         if support is Support.WITHDRAWN:
             self._tracker.stop()
@@ -312,8 +310,6 @@ class Localizer:
             self._fire(Event.REVOKED)
             return self._list_places(scan)
         return []
-
-    # ---- steps
 
     def _arrive(
         self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis, event: Event, reason: str
@@ -330,15 +326,15 @@ class Localizer:
         self._places.pose_was_published()
         self._fire(event)
         initial = InitialPose(scan.stamp, pose.T_map_base, pose.covariance)
-        reason = self._choice() or reason
-        return [initial, pose, self._status(scan.stamp, reason, place.evidence)]
+        status = self._status(scan.stamp, self._unless_chosen(reason), place.evidence)
+        return [initial, pose, status]
 
     def _restart(
         self, stamp: float, event: Event, reason: str, evidence: Evidence | None = None
     ) -> Status:
         """Discard everything about the pose, and change the state."""
-        is_contradicted = event is Event.CONTRADICTED
-        self._lost_T_map_odom = self._tracker.T_map_odom if is_contradicted else None
+        is_lost = event is Event.CONTRADICTED
+        self._lost_T_map_odom = self._tracker.T_map_odom if is_lost else None
         self._tracker.stop()
         self._hint = self._chosen_by = None
         self._places.restart()
@@ -350,13 +346,12 @@ class Localizer:
         self._state = next_state(self._state, event)
 
     def _status(self, stamp: float, reason: str, evidence: Evidence | None = None) -> Status:
-        rivals, elsewhere = 0, None
-        if self._state is not State.NO_MAP and not self._places.is_blind:
-            elsewhere = self._places.belief.elsewhere
+        rivals = 1 if self._state is State.LOCALIZED else 0
         if self._state is State.DISAMBIGUATING or self._chosen_by is not None:
             rivals = self._places.rivals
-        elif self._state is State.LOCALIZED:
-            rivals = 1
+        elsewhere = None
+        if self._state is not State.NO_MAP and not self._places.is_blind:
+            elsewhere = self._places.belief.elsewhere
         return Status(stamp, self._state, reason, evidence, rivals, self._chosen_by, elsewhere)
 
     def _weigh(self, scan: LaserScan, T_odom_base: SE2, pace: Pace) -> bool:
@@ -383,10 +378,8 @@ class Localizer:
             # The places moved with the old frame.
             reason = "odometry jumped while several places fit: searching"
             return [self._restart(now.stamp, Event.ODOMETRY_JUMPED, reason)]
-        if self._state is State.VERIFYING_HINT and self._hint is not None:
-            self._places.restart(self._hint.prior)
-        else:
-            self._places.restart()
+        hint = self._hint if self._state is State.VERIFYING_HINT else None
+        self._places.restart(hint.prior if hint is not None else None)
         self._tracker.change_frame(before, now)
         return []
 
@@ -400,10 +393,7 @@ class Localizer:
         ]
         return [*outputs, motion] if motion is not None else outputs
 
-    def _choice(self) -> str:
-        """Say who chose the pose, and what the scans say; empty if the scans have decided."""
-        if self._chosen_by is None:
-            return ""
-        rivals = self._places.rivals
-        fit = f"{rivals} places fit equally well" if rivals > 1 else "the scans do not decide yet"
-        return f"chosen by {self._chosen_by}; {fit}"
+    def _unless_chosen(self, reason: str) -> str:
+        """Return a reason, or who chose the pose while the scans have not decided."""
+        source = self._chosen_by
+        return reason if source is None else self._places.choice_in_words(source)

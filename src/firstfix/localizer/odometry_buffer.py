@@ -1,4 +1,4 @@
-"""The odometry of the last seconds, to be asked at the stamp of a scan."""
+"""The odometry of the last seconds, interpolated at the stamp of a scan."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from firstfix.core.se2 import SE2
 
 _KEPT = 2000
 
-# No robot indoors does this between two messages; an odometry that was restarted does.
+# No robot indoors is faster. A larger step between two messages is a restart of the odometry.
 _FASTEST_M_S = 5.0
 _FASTEST_RAD_S = 15.0
 _JUMP_M = 0.3
 _JUMP_RAD = math.radians(30.0)
 
-# Odometry this close to zero, m, has just begun to count, unless the robot came from nearby.
+# Odometry this close to zero, m, has just been restarted, unless the robot came from nearby.
 _START_M = 0.05
 
-# After a silence of several messages, a step so long is more than a pose may be wrong by.
+# After a gap of several messages, a longer step than this needs a scan that confirms it.
 _LEAP_M = 0.5
-_SILENCE = 3.0
+_GAP_MESSAGES = 3.0
 
 
 class OdometryBuffer:
-    """Odometry in the order of its stamps, up to 2000 messages."""
+    """Odometry in the order of its stamps, at most 2000 messages."""
 
     def __init__(self) -> None:
         self._kept: deque[Odometry] = deque(maxlen=_KEPT)
@@ -38,7 +38,7 @@ class OdometryBuffer:
         return self._kept[-1] if self._kept else None
 
     def add(self, odometry: Odometry) -> bool:
-        """Take in a message; tell whether odometry has jumped, and what was before is forgotten.
+        """Add a message; after a jump all earlier messages are discarded.
 
         Parameters
         ----------
@@ -60,10 +60,10 @@ class OdometryBuffer:
         return jumped
 
     def leaps(self, odometry: Odometry) -> bool:
-        """Tell whether a message, not yet added, needs a scan that confirms it.
+        """Return whether a message, not yet added, needs a scan that confirms it.
 
-        After a silence nothing tells a robot that drove on from one whose base was restarted, and
-        counts from elsewhere.
+        After a gap a robot that drove on cannot be distinguished from one whose odometry was
+        restarted.
 
         Parameters
         ----------
@@ -79,10 +79,10 @@ class OdometryBuffer:
             return False
         before, last = self._kept[-2], self._kept[-1]
         usual_s = last.stamp - before.stamp
-        way = last.T_odom_base.distance_to(odometry.T_odom_base)
+        distance = last.T_odom_base.distance_to(odometry.T_odom_base)
         turn = angle_error(last.T_odom_base.yaw, odometry.T_odom_base.yaw)
-        is_after_silence = odometry.stamp - last.stamp > _SILENCE * usual_s
-        return is_after_silence and (way > _LEAP_M or turn > _JUMP_RAD)
+        is_after_gap = odometry.stamp - last.stamp > _GAP_MESSAGES * usual_s
+        return is_after_gap and (distance > _LEAP_M or turn > _JUMP_RAD)
 
     def at(self, stamp: float) -> SE2 | None:
         """Interpolate ``T_odom_base`` at a time; None if it is not known there, or not yet."""
@@ -108,9 +108,9 @@ def _has_jumped(last: Odometry, new: Odometry) -> bool:
     passed = new.stamp - last.stamp
     if passed < 0.0:
         return True
-    way = last.T_odom_base.distance_to(new.T_odom_base)
-    # However long it was silent: a base that was restarted is at zero, and stands where it stood.
-    if way > _JUMP_M and new.T_odom_base.distance_to(SE2.identity()) <= _START_M:
+    distance = last.T_odom_base.distance_to(new.T_odom_base)
+    # After a gap of any length: a restarted odometry is at zero, and the robot has not moved.
+    if distance > _JUMP_M and new.T_odom_base.distance_to(SE2.identity()) <= _START_M:
         return True
     turn = angle_error(last.T_odom_base.yaw, new.T_odom_base.yaw)
-    return way > _JUMP_M + _FASTEST_M_S * passed or turn > _JUMP_RAD + _FASTEST_RAD_S * passed
+    return distance > _JUMP_M + _FASTEST_M_S * passed or turn > _JUMP_RAD + _FASTEST_RAD_S * passed

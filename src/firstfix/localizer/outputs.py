@@ -1,4 +1,4 @@
-"""What a localizer has to say."""
+"""The outputs of a localizer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from firstfix.localizer.states import State
 
 @dataclass(frozen=True, eq=False, slots=True)
 class InitialPose:
-    """The robot has been found, at the start or anew; for whoever tracks from here.
+    """Where the robot has been found, at the start or again: the start of a track.
 
     Parameters
     ----------

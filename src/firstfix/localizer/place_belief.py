@@ -57,7 +57,7 @@ class Pace(Enum):
 
 
 class Support(Enum):
-    """What the belief says of a pose that has been published."""
+    """How the belief supports a pose that has been published."""
 
     SAME_PLACE = "the most likely place"
     OTHER_PLACE = "another place is sure"
@@ -108,6 +108,12 @@ class PlaceBelief:
         """True if the most likely place is sure with all priors left out."""
         shares = self.belief.evidence
         return len(shares) > 0 and bool(shares[0] >= self._config.sure_probability)
+
+    def choice_in_words(self, source: str) -> str:
+        """Say who chose a pose, and that the scans have not decided."""
+        rivals = self.rivals
+        fit = f"{rivals} places fit equally well" if rivals > 1 else "the scans do not decide yet"
+        return f"chosen by {source}; {fit}"
 
     def restart(self, prior: Prior | None = None) -> None:
         """Discard all views.
