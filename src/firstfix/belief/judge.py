@@ -127,10 +127,12 @@ def judge(
         reason = "the most likely place does not explain the latest view"
         kept = known if stays else None
         return Judgement(Verdict.AMBIGUOUS, reason, kept, unexplained=True)
-    if not stays and probabilities[0] < rule.probability:
+    alone = seen.decides_alone and _alone(costs[:, -1], len(seen.beams)) >= ALONE_PROBABILITY
+    # A first view is judged by the law of single scans, which is known well; it is less strict.
+    first = alone and len(window) == 1
+    if not (stays or first) and probabilities[0] < rule.probability:
         return Judgement(Verdict.AMBIGUOUS, _undecided(probabilities, len(window)), None)
 
-    alone = seen.decides_alone and _alone(costs[:, -1], len(seen.beams)) >= ALONE_PROBABILITY
     published = alone or rule.hinted or (known is not None and _confirmed(known, seen))
     since = seen if known is None else known.since
     favourite = Favourite(int(ids[0]), since, published)
