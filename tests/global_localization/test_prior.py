@@ -13,7 +13,7 @@ from firstfix.core.estimate import Verdict
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.frames import bases_in_map, to_map
-from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.global_localization.scan_matcher import ScanMatcher, _with_share_of_prior
 from firstfix.global_localization.verdict import log_likelihoods, with_prior
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import identical_rooms
@@ -109,3 +109,16 @@ def test_alternatives_need_a_weight_each():
     for priors, weights in (((), ()), ((near,), (1.0, 2.0)), ((near,), (0.0,))):
         with pytest.raises(InputError, match="one weight above 0 for each"):
             AnyOf(priors, weights)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "verdict"), [(1.0, Verdict.UNIQUE), (0.11, Verdict.UNIQUE), (0.09, Verdict.AMBIGUOUS)]
+)
+def test_a_prior_decides_only_among_places_that_the_scan_leaves_open(rooms, seen, ratio, verdict):
+    scan, places = seen
+    unique = rooms.locate(scan, prior=Near(places[0], 1.0))
+    result = _with_share_of_prior(unique, 0.5, ratio)
+    assert result.verdict is verdict
+    assert result.probability_without_prior == 0.5 * ratio
+    if verdict is Verdict.AMBIGUOUS:
+        assert "11 times better elsewhere" in result.reason

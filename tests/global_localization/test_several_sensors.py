@@ -71,6 +71,8 @@ def test_a_list_of_one_scan_is_that_scan(matcher, content_of):
     scan = two_scans(matcher.fields.grid, TRUTH)[0]
     assert content_of(matcher.locate([scan])) == content_of(matcher.locate(scan))
     assert matcher.locate([scan]).scans == (scan,)
+    blind = replace(scan, ranges=np.full(len(scan), np.nan))
+    assert matcher.locate(blind).scans == (blind,)
 
 
 def test_two_narrow_sensors_decide_what_one_does_not(halls_matcher, found):

@@ -70,11 +70,15 @@ class PlacePrior:
         kept: NDArray[np.float64] = poses[np.unique(np.concatenate([first, near[:shortlist]]))]
         return kept
 
-    def weighed(self, verification: Verification) -> NDArray[np.float64]:
-        """Return the costs, shape (n,), that stand for scan and prior together."""
+    def rankings(self, verification: Verification) -> list[NDArray[np.float64]]:
+        """Return the costs, each of shape (n,), by scan and prior, and by the scan alone.
+
+        Both keep their best places, so that a wrong prior is noticed; without a prior they are one.
+        """
+        scores = verification.scores
         if self.prior is None:
-            return verification.scores
-        return with_prior(verification.scores, self._logs(verification.poses), self.beams)
+            return [scores]
+        return [with_prior(scores, self._logs(verification.poses), self.beams), scores]
 
     def _logs(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
         assert self.prior is not None  # noqa: S101 - by the callers

@@ -33,7 +33,13 @@ from firstfix.global_localization.sensors import (
     joint_beams,
     see_enough,
 )
-from firstfix.global_localization.verdict import judge, nothing_to_match, place_probabilities
+from firstfix.global_localization.verdict import (
+    RIVAL_SHARE,
+    judge,
+    log_likelihoods,
+    nothing_to_match,
+    place_probabilities,
+)
 from firstfix.global_localization.verify import Verification, verified_place, verify
 
 # A third of the beams rejects most places; all beams rank the rest.
@@ -143,7 +149,7 @@ class ScanMatcher:
             result = locate(scans, self.fields, self.config, prior)
         else:
             result = self._locate_several(scans, T_odom_base, prior)
-        return replace(result, grid=self.fields.grid)
+        return replace(result, grid=self.fields.grid, scans=result.scans or scans)
 
     def __repr__(self) -> str:
         return f"<ScanMatcher {self.method.value} in {self.fields.grid!r}>"
@@ -248,17 +254,23 @@ def locate(
     depth = known.depth(config.shortlist)
     candidates, report = search(beams, fields, depth, config.max_poses)
     poses = refine_on_field(known.chosen(candidates.poses, config.shortlist), beams, fields)
-    first_look = known.weighed(verify(poses, beams.thinned(FIRST_LOOK_BEAMS), fields))
-    poses = poses[distinct_places(poses, first_look, resolution, SECOND_LOOK_PLACES)]
-    second_look = known.weighed(verify(poses, beams, fields))
-    ranked = distinct_places(poses, second_look, resolution, config.hypotheses)
-    poses = poses[ranked[: worth_listing(second_look[ranked], len(beams))]]
+    first_look = verify(poses, beams.thinned(FIRST_LOOK_BEAMS), fields)
+    best = [
+        distinct_places(poses, scores, resolution, SECOND_LOOK_PLACES)
+        for scores in known.rankings(first_look)
+    ]
+    second_look = verify(poses[_united(best)], beams, fields)
+    poses, best = second_look.poses, []
+    for scores in known.rankings(second_look):
+        ranked = distinct_places(poses, scores, resolution, config.hypotheses)
+        best.append(ranked[: worth_listing(scores[ranked], len(beams))])
+    poses = poses[_united(best)]
     on_rays, covariances = refine_on_rays(poses, beams, fields)
     # Rays are more precise, but worse in a map with smeared walls: keep the better pose of the two.
     poses = np.concatenate([on_rays, poses])
     covariances = np.concatenate([covariances, covariances])
     verification = verify(poses, beams, fields)
-    weighed = known.weighed(verification)
+    weighed = known.rankings(verification)[0]
     ranked = distinct_places(poses, weighed, resolution, config.hypotheses)
     probabilities = place_probabilities(weighed[ranked], len(beams))
 
@@ -272,16 +284,40 @@ def locate(
         verdict, reason = Verdict.AMBIGUOUS, f"{reason}, {_SEES_TOO_LITTLE}"
     result = LocateResult(verdict, reason, hypotheses, report, 0.0, scans=tuple(scans))
     if prior is not None:
-        by_scan = place_probabilities(verification.scores[ranked], len(beams))
-        result = _with_share_of_prior(result, float(by_scan[0]))
+        by_scan = distinct_places(poses, verification.scores, resolution, config.hypotheses)
+        alone = place_probabilities(verification.scores[by_scan], len(beams))
+        logs = log_likelihoods(verification.scores[[ranked[0], by_scan[0]]], len(beams))
+        result = _with_share_of_prior(result, float(alone[0]), float(np.exp(logs[0] - logs[1])))
     return replace(result, elapsed_s=time.perf_counter() - started)
 
 
-def _with_share_of_prior(result: LocateResult, by_scan: float) -> LocateResult:
-    """State how likely the best place is by the scan alone."""
-    both = result.hypotheses[0].probability
-    share = f"; {by_scan:.0%} likely by the scan alone, {both:.0%} with the prior"
-    return replace(result, reason=result.reason + share, probability_without_prior=by_scan)
+def _united(rankings: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
+    """Return the indices of all rankings, in the order of the first one where it is the only."""
+    return rankings[0] if len(rankings) == 1 else np.unique(np.concatenate(rankings))
+
+
+def _with_share_of_prior(result: LocateResult, favourite: float, ratio: float) -> LocateResult:
+    """State how likely the best place is by the scan alone; where they disagree, neither decides.
+
+    A prior chooses among places that the scan cannot tell apart. One that needs a place that fits
+    clearly worse than another may be wrong.
+
+    Parameters
+    ----------
+    result : LocateResult
+        By scan and prior.
+    favourite : float
+        Probability of the best place by the scan alone.
+    ratio : float
+        Likelihood of the best place of the result against that one, by the scan alone.
+    """
+    alone, both = favourite * ratio, result.hypotheses[0].probability
+    reason = f"{result.reason}; {alone:.0%} likely by the scan alone, {both:.0%} with the prior"
+    verdict = result.verdict
+    if verdict is Verdict.UNIQUE and ratio < RIVAL_SHARE:
+        verdict = Verdict.AMBIGUOUS
+        reason = f"the scan fits {1.0 / ratio:.0f} times better elsewhere than near the prior"
+    return replace(result, verdict=verdict, reason=reason, probability_without_prior=alone)
 
 
 def worth_listing(scores: NDArray[np.float64], beams: int) -> int:
