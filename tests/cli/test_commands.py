@@ -90,14 +90,14 @@ def test_map_check_finds_a_place_that_is_like_no_other(cli, unique: Files) -> No
     ended = cli("map", "check", unique[0], "--samples", 5)
     assert ended.status == 0
     assert "5 random places" in ended.out
-    assert "UNIQUE and right  100.0%" in ended.out
+    assert "one place, right  100.0%" in ended.out
     assert "~" not in ended.out
 
 
 def test_map_check_names_the_places_that_look_alike(cli, alike: Files) -> None:
     ended = cli("map", "check", alike[0], "--samples", 12, "--beams", 180, "--seed", 1)
     assert ended.status == 0
-    assert "AMBIGUOUS         100.0%" in ended.out
+    assert "several places    100.0%" in ended.out
     (*pairs, rest) = ended.out[ended.out.index("~") :].splitlines()[1:]
     assert len(pairs) == 10
     assert rest == "and 2 more"
@@ -208,3 +208,9 @@ def test_the_doctor_prints_what_is_installed(cli) -> None:
     for word in ("firstfix", "python", "numpy", "numba", "matplotlib", "cache", "kernels", "ROS"):
         assert f"\n{word}" in f"\n{ended.out}"
     assert "ready after" in ended.out
+
+
+def test_map_check_says_when_a_sensor_needs_a_second_view(cli, unique: Files) -> None:
+    ended = cli("map", "check", unique[0], "--samples", 3, "--fov", 180, "--range", 8)
+    assert "one place, right" in ended.out
+    assert "One scan of this sensor is never UNIQUE" in ended.out

@@ -19,7 +19,7 @@ HERE, NEAR_HERE, THERE = SE2(2.0, 2.0, 1.0), SE2(2.1, 2.0, 1.1), SE2(10.0, 2.0, 
         ([SE2(2.0, 2.0, -2.0)], Verdict.UNIQUE, Look.MISTAKEN, SE2(2.0, 2.0, -2.0)),
         ([NEAR_HERE, THERE], Verdict.AMBIGUOUS, Look.AMBIGUOUS, THERE),
         ([THERE, NEAR_HERE], Verdict.AMBIGUOUS, Look.AMBIGUOUS, THERE),
-        ([NEAR_HERE], Verdict.AMBIGUOUS, Look.AMBIGUOUS, None),
+        ([NEAR_HERE], Verdict.AMBIGUOUS, Look.FOUND, None),
         ([NEAR_HERE, THERE], Verdict.NO_MATCH, Look.LOST, THERE),
     ],
 )

@@ -14,6 +14,7 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.pose_error import PoseError
 from firstfix.core.se2 import SE2
 from firstfix.fields.cache import cache_folder
+from firstfix.global_localization.config import LocateConfig
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.global_localization.searchable import check_searchable
 from firstfix.lab.metrics.outcome import FOUND
@@ -28,12 +29,15 @@ _SIGMA_M = 0.01
 
 
 class Look(Enum):
-    """The result of one scan at a place."""
+    """Which places fit a scan.
 
-    FOUND = "UNIQUE and right"
-    AMBIGUOUS = "AMBIGUOUS"
-    LOST = "NO_MATCH"
-    MISTAKEN = "UNIQUE but wrong"
+    The verdict is not used: one scan of a sensor that sees little is never UNIQUE.
+    """
+
+    FOUND = "one place, right"
+    AMBIGUOUS = "several places"
+    LOST = "no place"
+    MISTAKEN = "one place, wrong"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -48,11 +52,14 @@ class Place:
         The result.
     double : Hypothesis or None
         The most likely other place, if it is plausible.
+    needs_second_view : bool
+        True if one place fits, but one scan of this sensor is not enough to publish it.
     """
 
     pose: SE2
     look: Look
     double: Hypothesis | None
+    needs_second_view: bool = False
 
 
 def sensor(beams: int, fov_deg: float, range_m: float) -> Lidar:
@@ -88,7 +95,10 @@ def look_from(pose: SE2, result: LocateResult) -> Place:
         for hypothesis in result.hypotheses
         if hypothesis.probability >= PLAUSIBLE and not _is_at(pose, hypothesis)
     ]
-    return Place(pose, _look(pose, result), others[0] if others else None)
+    look = _look(pose, result)
+    single = look in (Look.FOUND, Look.MISTAKEN)
+    needs_second_view = single and result.verdict is Verdict.AMBIGUOUS
+    return Place(pose, look, others[0] if others else None, needs_second_view)
 
 
 def share(places: Sequence[Place], look: Look) -> float:
@@ -110,7 +120,7 @@ def _look(pose: SE2, result: LocateResult) -> Look:
     best = result.best
     if best is None or result.verdict is Verdict.NO_MATCH:
         return Look.LOST
-    if result.verdict is Verdict.AMBIGUOUS:
+    if best.probability < LocateConfig().unique_probability:
         return Look.AMBIGUOUS
     return Look.FOUND if _is_at(pose, best) else Look.MISTAKEN
 
