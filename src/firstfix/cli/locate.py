@@ -158,7 +158,7 @@ def _as_text(result: LocateResult, truth: SE2 | None) -> str:
             lines.append(f"truth        {error.metres:.3f} m, {degrees:.2f}° away")
     proof = "optimum proven" if search.proven else "optimum not proven"
     lines += [
-        f"search       {search.poses:,} poses, {search.searched:.0%} decided, {proof}",
+        f"search       {search.poses:,} poses, {search.searched:.0%} searched, {proof}",
         f"time         {result.elapsed_s:.3f} s",
     ]
     rows = _rows(result)

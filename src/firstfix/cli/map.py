@@ -178,8 +178,8 @@ def _lines(places: Sequence[Place]) -> list[str]:
     lines = [f"{look.value:<18}{share(places, look):6.1%}" for look in Look]
     if any(place.needs_second_view for place in places):
         lines.append(
-            "One scan of this sensor is never UNIQUE: it sees too little. The robot publishes a pose "
-            "after a second view, 0.3 m or 15° further."
+            "One scan of this sensor is never UNIQUE: it sees too little. The robot publishes a "
+            "pose after a second view, 0.3 m or 15° further."
         )
     pairs = doubles(places)
     if pairs:
