@@ -112,31 +112,31 @@ class Robot:
         """Return the map as a message."""
         return occupancy_grid(make, 0.0, "map", self._grid)
 
-    def obey(self, reported: dict[str, Any]) -> None:
-        """Change."""
-        self._flaws = reported.get("flaws", self._flaws)
-        T_new_old = SE2(*reported.get("shift", (0.0, 0.0, 0.0)))
+    def execute(self, command: dict[str, Any]) -> None:
+        """Execute a command of the module's docstring."""
+        self._flaws = command.get("flaws", self._flaws)
+        T_new_old = SE2(*command.get("shift", (0.0, 0.0, 0.0)))
         self._grid = replace(self._grid, T_map_grid=T_new_old @ self._grid.T_map_grid)
         self.publish_latched()
-        if "hint" in reported:
+        if "hint" in command:
             self._publishers["initialpose"] = rospy.Publisher(
                 "initialpose", _kind(TYPES["initialpose"]), latch=True, queue_size=1
             )
-            where = SE2(*reported["hint"])
-            reported = pose_with_covariance(make, 0.0, "map", where, np.diag([0.25, 0.25, 0.07]))
-            self._publishers["initialpose"].publish(reported)
-        if "gone" in reported:  # the person, whose word would be latched for others that come later
+            where = SE2(*command["hint"])
+            hint = pose_with_covariance(make, 0.0, "map", where, np.diag([0.25, 0.25, 0.07]))
+            self._publishers["initialpose"].publish(hint)
+        if "gone" in command:  # its latched hint would reach later subscribers
             self._publishers.pop("initialpose").unregister()
-        if "go" in reported:
+        if "go" in command:
             TOLD.set()
-        if "ask" in reported:
-            rospy.wait_for_service(reported["ask"], timeout=10.0)
-            rospy.ServiceProxy(reported["ask"], Empty)()
+        if "ask" in command:
+            rospy.wait_for_service(command["ask"], timeout=10.0)
+            rospy.ServiceProxy(command["ask"], Empty)()
 
     def listen(self) -> None:
         """Execute commands from stdin."""
         for line in sys.stdin:
-            self.obey(json.loads(line))
+            self.execute(json.loads(line))
 
 
 def _kind(name: str) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -106,7 +107,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "belief.first_shortlist": {"to": 1, "in": "rooms"},
     "belief.shortlist": {"to": 1, "in": "a loss"},
     "belief.places": {"to": 2, "in": "rooms"},
-    "belief.sure_probability": {"to": 1.0},
+    "belief.sure_probability": {"to": 1.0, "in": "a short sensor"},
 }
 REFUSED = {"recovery_alpha_slow": 0.1, "recovery_alpha_fast": 0.1, "locate.hypotheses": 5}
 MOTION = SE2(0.3, 0.0, 0.1)
@@ -124,6 +125,7 @@ class Drive:
         *,
         blinded: int = 0,
         scans: int = 20,
+        reach: float = math.inf,
     ) -> None:
         self.wire, self.world = wire, world
         robot = Speaker(wire, world, start)
@@ -132,6 +134,9 @@ class Drive:
             if i in (8, 12):
                 robot.pose = robot.pose @ SE2(0.12, 0.1, 0.04) if i == 8 else carried_to
             tf, scan = robot.report(lambda channel, message: (channel, message))
+            if reach < scan[1].range_max:
+                scan[1].range_max = reach
+                scan[1].ranges = np.where(scan[1].ranges > reach, np.inf, scan[1].ranges)
             if 0 <= i - 12 < blinded:  # it fits nowhere
                 scan[1].ranges = 2.0 + np.sin(np.arange(180.0) * i).astype(np.float32)
             self.messages += [tf, scan]
@@ -165,6 +170,9 @@ def drives(ros2: Any, hall_plan: OccupancyGrid) -> dict[str, Drive]:
         "hall": Drive(ros2, hall_plan, SE2(3.0, 2.5, 0.4), SE2(7.5, 5.0, -1.5)),
         "a loss": Drive(
             ros2, hall_plan, SE2(1.5, 1.5, 0.2), SE2(6.9, 3.0, 1.5), blinded=11, scans=32
+        ),
+        "a short sensor": Drive(
+            ros2, hall_plan, SE2(3.0, 2.5, 0.4), SE2(7.5, 5.0, -1.5), reach=4.0
         ),
         "rooms": Drive(ros2, rooms, SE2(2.0, 2.0, 0.4), SE2(2.5, 2.5, 0.4)),
     }
