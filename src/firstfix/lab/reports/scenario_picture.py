@@ -30,7 +30,9 @@ def draw_scenario(grid: OccupancyGrid, steps: Sequence[DemoStep], path: Path) ->
         label = episode == 0
         axes.plot(*_xy([s.truth for s in part if not s.lifted]), color="black", lw=2.6,
                   label="truth" if label else None, zorder=3)  # fmt: skip
-        axes.plot(*_xy([s.published for s in part]), color=BLUE, lw=1.4,
+        # The line is broken where the robot was found: the published pose jumps there.
+        tracked = [s.published if s.initial is None else None for s in part]
+        axes.plot(*_xy(tracked), color=BLUE, lw=1.4,
                   label="published" if label else None, zorder=4)  # fmt: skip
         if episode > 0:
             carried = [steps[steps.index(part[0]) - 1].truth, _first_standing(part).truth]
@@ -43,7 +45,7 @@ def draw_scenario(grid: OccupancyGrid, steps: Sequence[DemoStep], path: Path) ->
                   label="found" if i == 0 else None)  # fmt: skip
         axes.annotate(f"{step.stamp:.1f} s", (initial.x, initial.y), (8, 8),
                       textcoords="offset points", zorder=7, color=GREEN, weight="bold")  # fmt: skip
-    axes.set(title="Found, followed, carried away, found again")
+    axes.set(title="Found, tracked, carried away, found again")
     figure.legend(loc="outside lower center", ncols=5)
     return save_figure(figure, path)
 
