@@ -16,7 +16,7 @@ COLOURS = (GREEN, BLUE, PURPLE, ORANGE)
 
 
 def main() -> None:
-    """Draw CPU time a scan for each method and building, with the success beside the bar."""
+    """Draw CPU time a scan for each method and building, with the success next to the bar."""
     measured = json.loads(FIGURES.read_text(encoding="utf-8"))["locate"]
     figure = new_figure(9.0, 4.6)
     axes = figure.subplots()

@@ -68,7 +68,7 @@ PARTICLES = Topic(
     "particle_cloud",
     "nav2_msgs/ParticleCloud",
     Delivery.SENSOR,
-    "the particles, while somebody subscribes (full)",
+    "the particles, while there is a subscriber (full)",
 )
 # RViz of ROS 1 can display this type, and it exists where nav2_msgs is not installed.
 PARTICLE_POSES = replace(PARTICLES, type_name="geometry_msgs/PoseArray")
@@ -82,7 +82,7 @@ MARKERS = Topic(
     "hypothesis_markers",
     "visualization_msgs/MarkerArray",
     Delivery.RELIABLE,
-    "these places with their probabilities, while somebody subscribes",
+    "these places with their probabilities, while there is a subscriber",
 )
 LOCALIZED = Topic(
     "localized",
