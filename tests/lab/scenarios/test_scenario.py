@@ -14,6 +14,7 @@ from firstfix.core.se2 import SE2
 from firstfix.lab.scenarios.phases import CarryTo, DriveTo, Stand, Teleport
 from firstfix.lab.scenarios.scenario import Scenario, run
 from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.simulation.rigs import Rig
 from firstfix.lab.simulation.simulation import Disturbance, Moment
 from firstfix.lab.worlds.drawing import Drawing
 
@@ -133,7 +134,7 @@ def test_furniture_is_seen_though_no_map_has_it(flat: OccupancyGrid) -> None:
     start = SE2(1.0, 1.0, 0.0)
     exact = Lidar(sigma_m=0.0)
     bare, full = (
-        next(run(Scenario([Stand(0.1)], start, lidar=exact, furniture=n), flat, seed=1)).scan
+        next(run(Scenario([Stand(0.1)], start, rig=Rig((exact,)), furniture=n), flat, seed=1)).scan
         for n in (0, 3)
     )
     assert bare is not None

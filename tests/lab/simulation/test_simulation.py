@@ -9,15 +9,16 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.lab.simulation.floor import Floor
 from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.simulation.rigs import RIGS, Rig, Shutter
 from firstfix.lab.simulation.robot import Kobuki
-from firstfix.lab.simulation.simulation import Disturbance, Shutter, Simulation
+from firstfix.lab.simulation.simulation import Disturbance, Simulation
 
 START = SE2(4.0, 1.5, 0.3)
 
 
 def simulation(grid: OccupancyGrid, shutter: Shutter = Shutter.AT_ONCE) -> Simulation:
-    lidar = Lidar(sigma_m=0.0)
-    return Simulation(Floor(grid), Kobuki(), lidar, shutter, START, np.random.SeedSequence(1))
+    rig = Rig((Lidar(sigma_m=0.0),), shutter=shutter)
+    return Simulation(Floor(grid), Kobuki(), rig, START, np.random.SeedSequence(1))
 
 
 def turning(T_map_base: SE2) -> tuple[float, float]:
@@ -30,6 +31,17 @@ def test_odometry_and_signals_come_before_the_scan_of_their_stamp(hall_plan: Occ
     moments_of.robot.lift()
     kinds = [type(event) for event in moments_of.step("second").events]
     assert kinds == [Signal, Signal, Odometry, LaserScan, Odometry, Odometry, Odometry, Odometry]
+
+
+def test_two_sensors_report_at_the_stamp_of_one_odometry(hall_plan: OccupancyGrid) -> None:
+    moments_of = simulation(hall_plan)
+    moments_of.rig = RIGS["two-lasers"]
+    moment = moments_of.step("drive", turning)
+    assert [type(event) for event in moment.events[:3]] == [Odometry, LaserScan, LaserScan]
+    assert [scan.stamp for scan in moment.scans] == [0.0, 0.0]
+    assert [scan.T_base_laser for scan in moment.scans] == [
+        lidar.T_base_laser for lidar in RIGS["two-lasers"].lidars
+    ]
 
 
 def test_truth_is_that_of_the_scan(hall_plan: OccupancyGrid) -> None:

@@ -16,18 +16,17 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.lab.scenarios.phases import CarryTo, DriveTo, Manner, Pause, Spin, Stand
 from firstfix.lab.scenarios.scenario import Scenario, check_room, start_simulation
-from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.simulation.rigs import RIGS, Rig
 from firstfix.lab.simulation.simulation import Moment
 from firstfix.lab.worlds.catalog import WORLDS, random_free_pose
 from firstfix.web.snapshot import SimulationStatus
 
 MOST_PEOPLE = 30
 
-_USUAL = Scenario(()).lidar
-SENSORS: dict[str, Lidar] = {
-    "360° x 12 m": _USUAL,
-    "180° x 8 m": replace(_USUAL, beams=361, fov=math.radians(180.0), range_max=8.0),
-    "60° x 5 m": replace(_USUAL, beams=121, fov=math.radians(60.0), range_max=5.0),
+SENSORS: dict[str, Rig] = {
+    "360° x 12 m": RIGS["lidar"],
+    "180° x 8 m": RIGS["half-lidar"],
+    "60° x 5 m": RIGS["depth-camera"],
 }
 """The sensors of the menu, by the name in it; the first is the default."""
 
@@ -197,7 +196,7 @@ class SimulatedRobot:
             )
         with self._lock:
             self._sensor = name
-            self._simulation.lidar = SENSORS[name]
+            self._simulation.rig = SENSORS[name]
 
     def select_world(self, name: str) -> None:
         """Restart the simulation in another world.
@@ -217,7 +216,7 @@ class SimulatedRobot:
             self._enter(name, grid)
 
     def _enter(self, world: str, grid: OccupancyGrid) -> None:
-        scenario = Scenario((), lidar=SENSORS[self._sensor])
+        scenario = Scenario((), rig=SENSORS[self._sensor])
         self._simulation = start_simulation(scenario, grid, self._seed)
         self._radius_m = scenario.kobuki.radius_m
         self._plan = self._start()

@@ -13,14 +13,10 @@ from firstfix.core.se2 import SE2
 from firstfix.lab.scenarios.phases import Phase
 from firstfix.lab.simulation.floor import Floor
 from firstfix.lab.simulation.furniture import furnished
-from firstfix.lab.simulation.lidar import Lidar
+from firstfix.lab.simulation.rigs import RIGS, Rig
 from firstfix.lab.simulation.robot import Kobuki
-from firstfix.lab.simulation.simulation import Moment, Shutter, Simulation
+from firstfix.lab.simulation.simulation import Moment, Simulation
 from firstfix.lab.worlds.catalog import random_free_pose
-
-
-def _usual_lidar() -> Lidar:
-    return Lidar(dropout=0.01, T_base_laser=SE2(0.07, 0.0, 0.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,10 +31,8 @@ class Scenario:
         First ``T_map_base``; None for a random free pose.
     kobuki : Kobuki
         The robot.
-    lidar : Lidar
-        Its sensor, by default a few centimetres before its centre.
-    shutter : Shutter
-        Whether motion skews the scans.
+    rig : Rig
+        Its sensors, by default one LIDAR a few centimetres before its centre.
     furniture : int
         Boxes in the building that are not in the map.
     """
@@ -46,8 +40,7 @@ class Scenario:
     phases: Sequence[Phase]
     start: SE2 | None = None
     kobuki: Kobuki = field(default_factory=Kobuki)
-    lidar: Lidar = field(default_factory=_usual_lidar)
-    shutter: Shutter = Shutter.AT_ONCE
+    rig: Rig = RIGS["lidar"]
     furniture: int = 0
 
 
@@ -81,9 +74,7 @@ def start_simulation(scenario: Scenario, grid: OccupancyGrid, seed: int) -> Simu
     floor = Floor(grid)
     for place in (start, *(place for phase in scenario.phases for place in phase.places)):
         check_room(floor, place, scenario.kobuki.radius_m)
-    return Simulation(
-        floor, scenario.kobuki, scenario.lidar, scenario.shutter, start, for_simulation
-    )
+    return Simulation(floor, scenario.kobuki, scenario.rig, start, for_simulation)
 
 
 def check_room(floor: Floor, place: SE2, radius_m: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,13 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import MAX_BEAMS, LaserScan, Mounting
 from firstfix.core.se2 import SE2
 from firstfix.fields.raycast import expected_ranges
+
+
+class NoReturn(Enum):
+    """What a sensor reports for a beam without return; the values are the ranges."""
+
+    OPEN_SPACE = np.inf  # nothing within range, as LIDARs do
+    UNKNOWN = np.nan  # no reading, as depth cameras do, and scans made of point clouds
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +44,8 @@ class Lidar:
         Pose of the sensor on the robot.
     mounting : Mounting
         Upright or upside down.
+    no_return : NoReturn
+        What a beam without return reports.
 
     Raises
     ------
@@ -57,6 +67,7 @@ class Lidar:
     dropout: float = 0.0
     T_base_laser: SE2 = field(default_factory=SE2.identity)
     mounting: Mounting = Mounting.UPRIGHT
+    no_return: NoReturn = NoReturn.OPEN_SPACE
 
     def __post_init__(self) -> None:
         for name, value, holds, expected in (
@@ -100,7 +111,7 @@ class Lidar:
         Returns
         -------
         LaserScan
-            The scan; inf for beams without return.
+            The scan; inf or NaN for beams without return.
         """
         as_instance(OccupancyGrid, grid, "grid")
         T_map_laser = as_pose(T_map_base, "T_map_base") @ self.T_base_laser
@@ -130,7 +141,7 @@ class Lidar:
         lost = rng.random(self.beams) < self.dropout
         # Noise must not push a return beyond the limit, where it would mean open space to a reader.
         measured = np.minimum(measured, np.nextafter(np.float32(self.range_max), np.float32(0.0)))
-        return self._as_scan(np.where(np.isinf(true) | lost, np.inf, measured), stamp)
+        return self._as_scan(np.where(np.isinf(true) | lost, self.no_return.value, measured), stamp)
 
     def _as_scan(self, ranges: NDArray[np.float64], stamp: float) -> LaserScan:
         first = -self.angle_increment * (self.beams - 1) / 2

@@ -14,9 +14,9 @@ from firstfix.core.odometry import Odometry, Signal
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.lab.simulation.floor import Floor
-from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.simulation.people import People
 from firstfix.lab.simulation.planner import Planner
+from firstfix.lab.simulation.rigs import Rig, Shutter
 from firstfix.lab.simulation.robot import Kobuki, Robot
 from firstfix.lab.simulation.sweep import NOBODY, sweep
 
@@ -32,13 +32,6 @@ Command = Callable[[SE2], tuple[float, float]]
 """A controller: from ``T_map_base`` to the speed v (m/s) and the turn rate w (rad/s)."""
 
 Event = LaserScan | Odometry | Signal
-
-
-class Shutter(Enum):
-    """When the beams of a scan are measured."""
-
-    AT_ONCE = "at once"
-    ROLLING = "rolling"  # one after another, while the sensor turns: motion skews the scan
 
 
 class Disturbance(Enum):
@@ -75,9 +68,14 @@ class Moment:
     disturbance: Disturbance | None = None
 
     @property
+    def scans(self) -> tuple[LaserScan, ...]:
+        """One scan of each sensor; none in a pause."""
+        return tuple(event for event in self.events if isinstance(event, LaserScan))
+
+    @property
     def scan(self) -> LaserScan | None:
-        """The scan; None in a pause."""
-        return next((event for event in self.events if isinstance(event, LaserScan)), None)
+        """The scan of the first sensor; None in a pause."""
+        return next(iter(self.scans), None)
 
 
 def at_rest(T_map_base: SE2) -> tuple[float, float]:
@@ -95,10 +93,8 @@ class Simulation:
         Walls and furniture.
     kobuki : Kobuki
         Parameters of the robot.
-    lidar : Lidar
-        Its sensor.
-    shutter : Shutter
-        When the sensor measures its beams.
+    rig : Rig
+        Its sensors; may be exchanged.
     T_map_base : SE2
         First pose.
     seed : numpy.random.SeedSequence
@@ -109,8 +105,7 @@ class Simulation:
         self,
         floor: Floor,
         kobuki: Kobuki,
-        lidar: Lidar,
-        shutter: Shutter,
+        rig: Rig,
         T_map_base: SE2,
         seed: np.random.SeedSequence,
     ) -> None:
@@ -121,8 +116,7 @@ class Simulation:
         self.planner = Planner(floor, kobuki.radius_m + _MARGIN_M)
         self.people = People(floor, crowd)
         self.rng = script
-        self.lidar = lidar
-        self._shutter = shutter
+        self.rig = rig
         self._beams = beams
         self._ticks = 0
         self._disturbance: Disturbance | None = None
@@ -154,22 +148,34 @@ class Simulation:
             events.extend(self.robot.signals(self.stamp))
             events.append(Odometry(self.stamp, self.robot.T_odom_base))
             self._tick(command)
-        scan = sweep(
-            self.lidar,
-            self.floor,
-            T_map_base,
-            self._beams,
-            stamp=stamp,
-            circles=circles,
-            T_map_base_after=self.robot.T_map_base if self._shutter is Shutter.ROLLING else None,
-        )
-        if self._shutter is Shutter.ROLLING:
-            per_beam = PERIOD_S * self.lidar.angle_increment / FULL_TURN
-            scan = replace(scan, time_increment=per_beam)
         # A scan has the stamp of its first beam, though it is complete only with its last.
         beginning = sum(event.stamp == stamp for event in events)
-        events.insert(beginning, scan)
+        events[beginning:beginning] = self._scans(stamp, T_map_base, circles)
         return self._end(stamp, events, T_map_base, phase)
+
+    def _scans(
+        self, stamp: float, T_map_base: SE2, circles: NDArray[np.float64]
+    ) -> list[LaserScan]:
+        """Take one scan of each sensor, begun at a pose and ended at the present one."""
+        rolling = self.rig.shutter is Shutter.ROLLING
+        scans = [
+            sweep(
+                lidar,
+                self.floor,
+                T_map_base,
+                self._beams,
+                stamp=stamp,
+                circles=circles,
+                T_map_base_after=self.robot.T_map_base if rolling else None,
+            )
+            for lidar in self.rig.lidars
+        ]
+        if not rolling:
+            return scans
+        return [
+            replace(scan, time_increment=PERIOD_S * lidar.angle_increment / FULL_TURN)
+            for scan, lidar in zip(scans, self.rig.lidars, strict=True)
+        ]
 
     def step_silently(self, phase: str) -> Moment:
         """Advance as far with nothing reported."""

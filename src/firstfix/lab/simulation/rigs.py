@@ -1,0 +1,104 @@
+"""The sensors of a simulated robot, by name."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from firstfix.core.errors import InputError
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.lab.simulation.lidar import Lidar, NoReturn
+
+
+class Shutter(Enum):
+    """When the beams of a scan are measured."""
+
+    AT_ONCE = "at once"
+    ROLLING = "rolling"  # one after another, while the sensor turns: motion skews the scan
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """All sensors of one robot.
+
+    Parameters
+    ----------
+    lidars : tuple of Lidar
+        At least one, each with its own pose on the robot.
+    words : str
+        For people: what it is, field of view and range.
+    shutter : Shutter
+        Whether motion skews the scans.
+
+    Raises
+    ------
+    InputError
+        If there is no sensor.
+    """
+
+    lidars: tuple[Lidar, ...]
+    words: str = ""
+    shutter: Shutter = Shutter.AT_ONCE
+
+    def __post_init__(self) -> None:
+        if not self.lidars:
+            raise InputError("A robot without a sensor cannot be simulated. Add a Lidar.")
+
+    def scans(
+        self, grid: OccupancyGrid, T_map_base: SE2, rng: np.random.Generator, stamp: float = 0.0
+    ) -> tuple[LaserScan, ...]:
+        """Take one scan of each sensor of a robot at rest; arguments as of `Lidar.scan`."""
+        return tuple(lidar.scan(grid, T_map_base, rng, stamp) for lidar in self.lidars)
+
+
+_USUAL = Lidar(dropout=0.01, T_base_laser=SE2(0.07, 0.0, 0.0))
+# A safety laser on a corner sees three quarters of the floor; the robot hides the rest.
+_CORNER = replace(_USUAL, beams=541, fov=math.radians(270.0), range_max=8.0)
+_CAMERA = replace(_USUAL, beams=121, fov=math.radians(60.0), range_max=5.0, range_min=0.3)
+
+RIGS: dict[str, Rig] = {
+    "lidar": Rig((_USUAL,), "360° x 12 m"),
+    "half-lidar": Rig(
+        (replace(_USUAL, beams=361, fov=math.radians(180.0), range_max=8.0),), "180° x 8 m"
+    ),
+    "two-lasers": Rig(
+        (
+            replace(_CORNER, T_base_laser=SE2(0.12, 0.12, math.radians(45.0))),
+            replace(_CORNER, T_base_laser=SE2(-0.12, -0.12, math.radians(-135.0))),
+        ),
+        "two lasers, 270° x 8 m each",
+    ),
+    "depth-camera": Rig(
+        # Depth from images is rougher, and a pixel without depth says nothing about the floor.
+        (replace(_CAMERA, sigma_m=0.03, no_return=NoReturn.UNKNOWN),),
+        "depth camera, 60° x 5 m",
+    ),
+    "3d-lidar": Rig(
+        # As `scan_from_points` makes it of a cloud: every half degree, NaN without a point.
+        (Lidar(beams=720, range_min=0.3, range_max=30.0, no_return=NoReturn.UNKNOWN),),
+        "3D LIDAR, 360° x 30 m",
+    ),
+    "skewed-lidar": Rig((_USUAL,), "360° x 12 m, one beam after another", Shutter.ROLLING),
+}
+"""Sensors that robots have; the first is the default."""
+
+
+def find_rig(name: str) -> Rig:
+    """Return the sensors of this name.
+
+    Raises
+    ------
+    InputError
+        If there are none of this name.
+    """
+    if name in RIGS:
+        return RIGS[name]
+    near = difflib.get_close_matches(name, RIGS, 1)
+    hint = f" Did you mean {near[0]}?" if near else ""
+    raise InputError(f"There is no sensor {name!r:.40}. Choose one of {', '.join(RIGS)}.{hint}")
