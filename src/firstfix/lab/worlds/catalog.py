@@ -16,11 +16,14 @@ from firstfix.fields.clearance import chessboard_clearance
 from firstfix.io.maps.map_server import load_map
 from firstfix.lab.worlds.corridor import corridor
 from firstfix.lab.worlds.drawing import MARGIN, RESOLUTION, Drawing
+from firstfix.lab.worlds.floors import RandomFloor
 from firstfix.lab.worlds.house import house
 from firstfix.lab.worlds.office import office
 from firstfix.lab.worlds.warehouse import warehouse
 
 ROOM_PITCH = 8.0
+
+_RANDOM_FLOOR = "floor:"
 
 
 def identical_rooms(count: int) -> OccupancyGrid:
@@ -124,7 +127,7 @@ def parse_worlds(text: str, known: Collection[str]) -> list[str]:
 
 
 def world_or_map(name: str) -> OccupancyGrid:
-    """Draw a built-in world, or load a map by the path of its YAML.
+    """Draw a built-in world or a random floor (``floor:SEED``), or load a map by its YAML's path.
 
     Raises
     ------
@@ -133,9 +136,11 @@ def world_or_map(name: str) -> OccupancyGrid:
     """
     if name in WORLDS:
         return WORLDS[name]()
+    if (seed := name.removeprefix(_RANDOM_FLOOR)) != name and seed.isdecimal():
+        return RandomFloor(int(seed)).map()
     if not Path(name).exists():
         raise InputError(
-            expected=f"the YAML of a map, or a built-in world ({', '.join(WORLDS)})",
+            expected=f"the YAML of a map, or a built-in world ({', '.join(WORLDS)}, floor:SEED)",
             received=f"no such file: {name}",
             remedy="check the path or the name",
         )
