@@ -46,6 +46,8 @@ PUBLIC = [
     "SensorModel",
     "Signal",
     "SignalKind",
+    "Site",
+    "SiteResult",
     "State",
     "Status",
     "TrackedPose",

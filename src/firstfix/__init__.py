@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     )
     from firstfix.localizer.precompile import precompile
     from firstfix.localizer.states import Event, State
+    from firstfix.site.result import SiteResult
+    from firstfix.site.site import Site
 
 __version__ = "0.1.0"
 
@@ -80,6 +82,8 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "SensorModel",
     "Signal",
     "SignalKind",
+    "Site",
+    "SiteResult",
     "State",
     "Status",
     "TrackedPose",
@@ -126,6 +130,8 @@ _MODULES = {
     "localizer.outputs": ("Hypotheses", "InitialPose", "MotionRequest", "Status", "TrackedPose"),
     "localizer.precompile": ("precompile",),
     "localizer.states": ("Event", "State"),
+    "site.result": ("SiteResult",),
+    "site.site": ("Site",),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -23,6 +23,7 @@ from firstfix.cli.locate import locate
 from firstfix.cli.map import map_app
 from firstfix.cli.nodes import AFTER_DASHES, PASSED_ON, dds, ros1, ros2
 from firstfix.cli.serve import serve
+from firstfix.cli.site import site_app
 from firstfix.cli.track import track
 from firstfix.core.errors import FirstfixError
 
@@ -43,6 +44,7 @@ app.command()(locate)
 app.command()(track)
 app.command()(bench)
 app.add_typer(map_app, name="map")
+app.add_typer(site_app, name="site")
 app.command()(demo)
 app.command(context_settings=AFTER_DASHES)(serve)
 app.command(context_settings=PASSED_ON)(ros1)

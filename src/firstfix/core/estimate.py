@@ -92,6 +92,8 @@ class Hypothesis:
     id : int or None
         Number that a localizer gives to the place and keeps as long as the place is listed; None
         in the answer to a single scan.
+    map_id : str or None
+        Which map of a site the pose is in; None where there is one map only.
 
     Examples
     --------
@@ -108,6 +110,7 @@ class Hypothesis:
     probability: float
     evidence: Evidence
     id: int | None = None
+    map_id: str | None = None
 
     @property
     def sigma_m(self) -> float:

@@ -20,7 +20,7 @@ _FLOOR = 0.2
 _DOUBTFUL_FIT = 0.6
 
 # Mean cost at which the best place of a wrong map begins to be as good as the right one.
-_WRONG_MAP_COST = 2.3
+WRONG_MAP_COST = 2.3
 
 # A place at least this fraction as likely as the best one is its rival.
 RIVAL_SHARE = 0.1
@@ -41,7 +41,7 @@ def place_probabilities(scores: NDArray[np.float64], beams: int) -> NDArray[np.f
     ndarray, shape (n,)
         Probability of each place; the rest to 1 is the probability of a place that is not listed.
     """
-    logs = log_likelihoods(np.append(scores, _WRONG_MAP_COST), beams)
+    logs = log_likelihoods(np.append(scores, WRONG_MAP_COST), beams)
     likelihoods: NDArray[np.float64] = np.exp(logs - logs.max())
     likelihoods /= likelihoods.sum()
     return likelihoods[:-1]

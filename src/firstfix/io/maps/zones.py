@@ -38,7 +38,17 @@ def load_zones(map_path: str | os.PathLike[str]) -> dict[str, Polygon]:
     """
     path = find_yaml(Path(map_path)).with_suffix(".zones.yaml")
     data = read_bytes(path, what="the zones of a map", limit=_MAX_BYTES)
-    zones = entries(load_mapping(data, path, example=_EXAMPLE), path).get("zones")
+    return zones_of(entries(load_mapping(data, path, example=_EXAMPLE), path).get("zones"), path)
+
+
+def zones_of(zones: Any, path: Path) -> dict[str, Polygon]:
+    """Return the zones of a YAML mapping: corners by name.
+
+    Raises
+    ------
+    MapError
+        If it is no mapping, or a zone is not a list of three or more corners.
+    """
     if not isinstance(zones, dict):
         raise MapError(f"{path} has no zones. Write a line like '{_EXAMPLE}'.")
     return {name: _polygon(name, corners, path) for name, corners in entries(zones, path).items()}

@@ -1,0 +1,248 @@
+"""Many maps as one: load, look, search, judge."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from firstfix.core.errors import FirstfixError, InputError
+from firstfix.core.grid import OccupancyGrid
+from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import MapFields
+from firstfix.io.maps.site_yaml import SiteDescription, SiteMap, Transition, read_site
+from firstfix.site.judge import judge_site
+from firstfix.site.look import Looked, look_at_all
+from firstfix.site.maps import PreparedMaps
+from firstfix.site.places import SiteCandidates
+from firstfix.site.query import SitePrior, SiteQuery
+from firstfix.site.result import SiteResult
+from firstfix.site.search import search_one_look
+from firstfix.site.views import search_views
+
+MEMORY_LIMIT = 2 << 30
+"""Default size of the prepared maps that are held at once, bytes."""
+
+
+class Site:
+    """Many maps, one of which a robot is in. Made by `Site.load`.
+
+    Parameters
+    ----------
+    description : SiteDescription
+        The maps and how they are connected.
+    cache_dir : Path or None
+        Folder of prepared maps; None prepares in memory.
+    memory_limit : int
+        Size of the prepared maps that are held at once, bytes.
+
+    Examples
+    --------
+    >>> _ = ff.save_map(grid, "ground.yaml")
+    >>> _ = ff.save_map(ff.OccupancyGrid(grid.cells[:, ::-1], 0.05), "first.yaml")
+    >>> site = ff.Site.load(".")
+    >>> site.map_ids
+    ('first', 'ground')
+    >>> site.locate(scan).map_id
+    'ground'
+    """
+
+    def __init__(
+        self,
+        description: SiteDescription,
+        cache_dir: Path | None = None,
+        memory_limit: int = MEMORY_LIMIT,
+    ) -> None:
+        self._entries = {entry.id: entry for entry in description.maps}
+        self._transitions = description.transitions
+        self._maps = PreparedMaps(self._entries, cache_dir, memory_limit)
+        self._faults: dict[str, str] = {}
+
+    @classmethod
+    def load(
+        cls,
+        path: str | os.PathLike[str],
+        cache_dir: Path | None = None,
+        memory_limit: int = MEMORY_LIMIT,
+    ) -> Site:
+        """Read which maps a site has; each is prepared when it is first used.
+
+        Parameters
+        ----------
+        path : path-like
+            A folder of map_server maps, or a ``site.yaml``.
+        cache_dir : Path, optional
+            Folder of prepared maps; by default they are prepared in memory.
+        memory_limit : int
+            Size of the prepared maps that are held at once, bytes.
+
+        Raises
+        ------
+        InputError
+            If there is no map, two have one id, or the site.yaml has a fault.
+        """
+        return cls(read_site(path), cache_dir, memory_limit)
+
+    @property
+    def map_ids(self) -> tuple[str, ...]:
+        """Ids of the maps that can be used, as far as is known."""
+        return tuple(name for name in self._entries if name not in self._faults)
+
+    @property
+    def faults(self) -> dict[str, str]:
+        """One sentence for each map that was found to be unusable."""
+        return dict(self._faults)
+
+    @property
+    def maps(self) -> dict[str, SiteMap]:
+        """What the files say of each map, usable or not."""
+        return dict(self._entries)
+
+    @property
+    def transitions(self) -> tuple[Transition, ...]:
+        """Lifts, doors and other ways between maps."""
+        return self._transitions
+
+    def fields(self, map_id: str) -> MapFields:
+        """Return a prepared map.
+
+        Raises
+        ------
+        InputError
+            If there is no such map, or it cannot be used.
+        """
+        return self._maps.get(map_id)
+
+    def grid(self, map_id: str) -> OccupancyGrid:
+        """Return a map."""
+        return self._maps.get(map_id).grid
+
+    def prepare(self, done: Callable[[str], None] = lambda _: None) -> None:
+        """Prepare all maps now, so that no scan waits for it.
+
+        Parameters
+        ----------
+        done : callable
+            Called with the id of each map when it is ready, or found to be unusable.
+        """
+        for entry in self._entries.values():
+            self._is_usable(entry)
+            done(entry.id)
+
+    def locate(
+        self,
+        scan: LaserScan | Sequence[LaserScan],
+        T_odom_base: Sequence[SE2] | None = None,
+        prior: SitePrior | None = None,
+    ) -> SiteResult:
+        """Find the map, and where in it, a scan was taken, or the newest of several.
+
+        Parameters
+        ----------
+        scan : LaserScan or sequence of LaserScan
+            As `ScanMatcher.locate`.
+        T_odom_base : sequence of SE2, optional
+            Odometry at each of several scans; by default the robot stood still.
+        prior : mapping of str to Prior or None, optional
+            Maps in which the robot may be, each with what is known of its pose there.
+
+        Returns
+        -------
+        SiteResult
+            One verdict over all maps.
+
+        Raises
+        ------
+        InputError
+            If several scans and their odometry do not belong together, or the prior names a map
+            that is not in the site.
+        """
+        started = time.perf_counter()
+        query = self.query(scan, T_odom_base, prior)
+        looked = self.first_look(query)
+        found = self.search(query, looked.promising)
+        result = judge_site(query, [looked], [found])
+        return replace(
+            result,
+            grid=None if result.map_id is None else self.grid(result.map_id),
+            elapsed_s=time.perf_counter() - started,
+        )
+
+    def query(
+        self,
+        scan: LaserScan | Sequence[LaserScan],
+        T_odom_base: Sequence[SE2] | None = None,
+        prior: SitePrior | None = None,
+    ) -> SiteQuery:
+        """Check and put together what `locate` takes; the result can be pickled."""
+        query = SiteQuery.of(scan, T_odom_base, prior)
+        for map_id in query.prior or {}:
+            self._entry(map_id)
+        return query
+
+    def first_look(self, query: SiteQuery, map_ids: Sequence[str] | None = None) -> Looked:
+        """Tell how promising maps are for a query, at little cost.
+
+        Parameters
+        ----------
+        query : SiteQuery
+            What is asked.
+        map_ids : sequence of str, optional
+            Some of the maps; by default all.
+        """
+        chosen = self.map_ids if map_ids is None else tuple(map_ids)
+        for map_id in chosen:
+            self._entry(map_id)
+        del query  # every map is promising, whatever was seen
+        return look_at_all(chosen)
+
+    def search(self, query: SiteQuery, map_ids: Sequence[str]) -> SiteCandidates:
+        """Search some of the maps; refine and verify the best places in one pool.
+
+        Parameters
+        ----------
+        query : SiteQuery
+            What is asked.
+        map_ids : sequence of str
+            Some of the maps; those of `Looked.promising`.
+
+        Raises
+        ------
+        InputError
+            If one of the maps is not in the site.
+        """
+        entries = [entry for entry in map(self._entry, map_ids) if self._is_usable(entry)]
+        search_maps = search_one_look if query.is_one_look else search_views
+        places = search_maps(query, entries, self._maps.get) if entries else ()
+        return SiteCandidates(
+            places,
+            searched=tuple(entry.id for entry in entries),
+            faults=tuple(self._faults[name] for name in map_ids if name in self._faults),
+        )
+
+    def _is_usable(self, entry: SiteMap) -> bool:
+        """Tell whether a map can be loaded, and note why if it cannot."""
+        if entry.id in self._faults:
+            return False
+        try:
+            self._maps.get(entry.id)
+        except FirstfixError as error:
+            self._faults[entry.id] = f"The map {entry.id} cannot be used: {error}"
+            return False
+        return True
+
+    def _entry(self, map_id: str) -> SiteMap:
+        if map_id not in self._entries:
+            names = sorted(self._entries)
+            listed = ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
+            raise InputError(
+                f"There is no map {map_id!r:.60} in this site. Choose one of {listed}."
+            )
+        return self._entries[map_id]
+
+    def __repr__(self) -> str:
+        faults = f", {len(self._faults)} unusable" if self._faults else ""
+        return f"<Site of {len(self._entries)} maps{faults}>"

@@ -1,0 +1,96 @@
+"""One verdict over many maps."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+from site_lab import ROOMS, draw, save_rooms, scan_in
+
+from firstfix.core.errors import InputError
+from firstfix.core.estimate import Verdict
+from firstfix.core.se2 import SE2
+from firstfix.io.maps.map_server import save_map
+from firstfix.site.judge import judge_site
+from firstfix.site.site import Site
+
+T = TypeVar("T")
+POSE = SE2(3.9, 1.7, 0.6)
+
+
+def through_a_pipe(value: T) -> T:
+    return pickle.loads(pickle.dumps(value))  # noqa: S301 - our own
+
+
+@pytest.mark.parametrize("room", sorted(ROOMS))
+def test_a_scan_is_located_in_its_map(site: Site, room: str) -> None:
+    result = site.locate(scan_in(room, POSE))
+    assert result.verdict is Verdict.UNIQUE
+    assert result.best is not None
+    assert result.map_id == room
+    assert result.best.pose.distance_to(POSE) < 0.1
+    assert result.map_probabilities[room] > 0.95
+    total = sum(result.map_probabilities.values()) + result.elsewhere
+    assert total == pytest.approx(1.0)
+
+
+def test_the_stages_can_be_spread_over_processes(site: Site) -> None:
+    scan = scan_in("first", POSE)
+    query = through_a_pipe(site.query(scan))
+    looked = [site.first_look(query, [name]) for name in site.map_ids]
+    found = [site.search(query, [name]) for name in site.map_ids]
+    spread = judge_site(query, *through_a_pipe((looked, found)))
+    whole = site.locate(scan)
+    assert (spread.verdict, spread.map_id) == (whole.verdict, "first")
+    assert spread.best is not None
+    assert whole.best is not None
+    assert spread.best.pose == whole.best.pose
+
+
+def test_several_scans_are_weighed_together(site: Site) -> None:
+    starts = [POSE, SE2(4.3, 1.9, 0.6), SE2(4.7, 2.1, 0.8)]
+    scans = [scan_in("second", pose, i, float(i)) for i, pose in enumerate(starts)]
+    odometry = [POSE.inverse() @ pose for pose in starts]
+    result = site.locate(scans, odometry)
+    assert (result.verdict, result.map_id) == (Verdict.UNIQUE, "second")
+    assert result.best is not None
+    assert result.best.pose.distance_to(starts[-1]) < 0.1
+
+
+def test_a_copy_of_a_map_is_no_rival(tmp_path: Path) -> None:
+    save_rooms(tmp_path)
+    save_map(draw(ROOMS["ground"]), tmp_path / "copy.yaml")
+    result = Site.load(tmp_path).locate(scan_in("ground", POSE))
+    assert result.verdict is Verdict.UNIQUE
+    assert {result.map_id, result.same_places[0][0].map_id} == {"copy", "ground"}
+
+
+def test_a_copy_on_another_floor_is_a_rival(tmp_path: Path) -> None:
+    save_rooms(tmp_path)
+    (tmp_path / "site.yaml").write_text(
+        "maps:\n  low: {map: ground, floor: 0}\n  high: {map: ground, floor: 1}\n"
+    )
+    result = Site.load(tmp_path).locate(scan_in("ground", POSE))
+    assert result.verdict is Verdict.AMBIGUOUS
+    assert {h.map_id for h in result.hypotheses[:2]} == {"low", "high"}
+
+
+def test_a_broken_map_is_named_and_the_others_load(tmp_path: Path) -> None:
+    save_rooms(tmp_path)
+    (tmp_path / "first" / "map.pgm").write_bytes(b"P5 nothing")
+    site = Site.load(tmp_path)
+    result = site.locate(scan_in("ground", POSE))
+    assert (result.verdict, result.map_id) == (Verdict.UNIQUE, "ground")
+    assert list(site.faults) == ["first"]
+    assert "first" in result.faults[0]
+    assert site.map_ids == ("ground", "second")
+
+
+def test_a_map_that_is_not_in_the_site(site: Site) -> None:
+    scan = scan_in("ground", POSE)
+    with pytest.raises(InputError, match="no map 'attic'"):
+        site.locate(scan, prior={"attic": None})
+    with pytest.raises(InputError, match="no map 'attic'"):
+        site.first_look(site.query(scan), ["attic"])
