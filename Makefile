@@ -26,6 +26,10 @@ $(STAMP): $(USER_STAMP)
 
 demo: $(USER_STAMP)
 	$(BIN)/firstfix demo --headless $(DEMO_ARGS)
+	@if [ -t 0 ] && [ -t 1 ]; then \
+	    printf '\nOpen the live page of this robot now? [Y/n] '; read answer; \
+	    case "$$answer" in [Nn]*) ;; *) exec $(BIN)/firstfix demo $(DEMO_ARGS);; esac; \
+	fi
 
 test: $(STAMP)
 	$(BIN)/python -m pytest -n 4 --dist worksteal $(TEST_ARGS)

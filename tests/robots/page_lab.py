@@ -140,13 +140,17 @@ class Visit:
         Of the browser.
     url : str
         Where to go.
+    is_invited : bool
+        Whether the tour is offered, as at a first visit.
     """
 
-    def __init__(self, context: BrowserContext, url: str) -> None:
+    def __init__(self, context: BrowserContext, url: str, *, is_invited: bool = False) -> None:
         self.problems: list[str] = []
         self._received = 0
         self._host = urlsplit(url).hostname
         self.page: Page = context.new_page()
+        if not is_invited:
+            self.page.add_init_script("localStorage.setItem('firstfix-tour', 'seen')")
         self.page.on("console", self._on_message)
         self.page.on("pageerror", lambda error: self.problems.append(f"error: {error}"))
         self.page.on("request", self._see)

@@ -31,10 +31,14 @@ def visit(chromium: Any) -> Iterator[Callable[..., page_lab.Visit]]:
     contexts, visits = [], []
 
     def open_page(
-        url: str, device: dict[str, Any] = page_lab.DESKTOP, **options: Any
+        url: str,
+        device: dict[str, Any] = page_lab.DESKTOP,
+        *,
+        is_invited: bool = False,
+        **options: Any,
     ) -> page_lab.Visit:
         contexts.append(chromium.new_context(**device, **options))
-        visits.append(page_lab.Visit(contexts[-1], url))
+        visits.append(page_lab.Visit(contexts[-1], url, is_invited=is_invited))
         return visits[-1]
 
     yield open_page
@@ -55,6 +59,14 @@ def office_server(chromium: Any) -> Iterator[page_lab.Server]:
 def rooms_server(chromium: Any) -> Iterator[page_lab.Server]:
     """Give a robot in one of four identical rooms."""
     server = page_lab.Server("rooms", "--seed", "1").start()
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def changing_server(chromium: Any) -> Iterator[page_lab.Server]:
+    """Give a robot of one test alone, which changes its world."""
+    server = page_lab.Server("office", "--seed", "1").start()
     yield server
     server.stop()
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -308,14 +307,6 @@ def test_a_covered_sensor_keeps_the_pose(page: Visit) -> None:
     assert page.data("state") == "LOCALIZED"
     page.page.click("#cover")
     wait_until(lambda: "beams fit" in page.page.inner_text("#reason"), lambda: "it sees again")
-
-
-@pytest.fixture
-def changing_server(chromium: Any) -> Iterator[Server]:
-    """Give a robot of one test alone, which changes its world."""
-    server = Server("office", "--seed", "1").start()
-    yield server
-    server.stop()
 
 
 def test_sensor_and_world_are_chosen_from_menus(changing_server: Server, visit: Visitor) -> None:

@@ -139,7 +139,7 @@ def bench(
         str | None,
         typer.Option(
             metavar="NAME,NAME...",
-            help="Built-in buildings: office, warehouse, house, corridor, rooms.",
+            help="Built-in buildings: office, warehouse, house, corridor, rooms, hotel.",
             show_default="all but rooms, which are identical; none with cases",
             rich_help_panel=KIDNAPPING,
         ),

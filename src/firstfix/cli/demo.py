@@ -32,7 +32,7 @@ def demo(
         str,
         typer.Option(
             metavar="NAME|MAP.yaml",
-            help="office, warehouse, house, corridor, rooms, or a map of your own.",
+            help="office, warehouse, house, corridor, rooms, hotel, or a map of your own.",
         ),
     ] = "office",
     seed: Annotated[int, typer.Option(min=0, help="Of places, noise and wheel slip.")] = 1,

@@ -14,6 +14,7 @@ from firstfix.core.se2 import SE2
 from firstfix.lab.live.simulated_robot import MOST_PEOPLE, SENSORS, SimulatedRobot
 from firstfix.lab.simulation.simulation import Moment
 from firstfix.lab.worlds.catalog import WORLDS, random_free_poses
+from firstfix.lab.worlds.hotel import HOTEL_START
 
 HOUSE = WORLDS["house"]()
 SOON = 1200  # scans: two minutes of its time
@@ -239,3 +240,12 @@ def test_a_deciding_motion_turns_and_drives_ahead(robot):
     turned = robot.T_map_base
     assert turned.distance_to(start) < 0.05
     assert abs(wrap(turned.yaw - start.yaw - np.pi / 2)) < 0.2
+
+
+def test_the_same_world_can_be_restarted_and_the_hotel_starts_where_a_motion_decides(robot):
+    step_until(robot, lambda moment: moment.phase == "drive")
+    robot.select_world("map")
+    assert robot.starts == 2
+    assert robot.step().stamp == 0.0
+    robot.select_world("hotel")
+    assert robot.T_map_base == HOTEL_START

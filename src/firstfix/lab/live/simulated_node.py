@@ -44,7 +44,7 @@ class SimulatedNode:
         self._store = store
         self._warn = warn
         self._inbox: Inbox[Input] = Inbox()
-        self._grid = robot.grid
+        self._starts = robot.starts
         self._localizer = Localizer(cache_dir=cache_folder())
         self._thread = threading.Thread(target=self._run, name="firstfix", daemon=True)
 
@@ -63,7 +63,7 @@ class SimulatedNode:
 
     def _run(self) -> None:
         precompile()
-        self._try(self._handle, NewMap(0.0, self._grid))
+        self._try(self._handle, NewMap(0.0, self._robot.grid))
         due = time.monotonic()
         while not self._inbox.is_closed:
             for given in self._inbox.take(max(0.0, due - time.monotonic())):
@@ -75,7 +75,7 @@ class SimulatedNode:
 
     def _advance(self) -> None:
         moment = self._robot.step()
-        if self._robot.grid is not self._grid:
+        if self._robot.starts != self._starts:
             self._restart()
         elif moment is not None:
             self._store.set_truth(moment.T_map_base)
@@ -83,11 +83,11 @@ class SimulatedNode:
                 self._handle(event)
 
     def _restart(self) -> None:
-        """Begin again in another world, whose clock starts at zero."""
-        self._grid = self._robot.grid
+        """Begin again in a world, whose clock starts at zero."""
+        self._starts = self._robot.starts
         self._localizer = Localizer(cache_dir=cache_folder())
         self._store.set_map_name(self._robot.status.world)
-        self._handle(NewMap(0.0, self._grid))
+        self._handle(NewMap(0.0, self._robot.grid))
 
     def _handle(self, given: Input) -> None:
         outputs = self._localizer.handle(given)

@@ -18,7 +18,7 @@ from firstfix.lab.scenarios.phases import CarryTo, DriveTo, Manner, Pause, Spin,
 from firstfix.lab.scenarios.scenario import Scenario, check_room, start_simulation
 from firstfix.lab.simulation.rigs import RIGS, Rig
 from firstfix.lab.simulation.simulation import Moment
-from firstfix.lab.worlds.catalog import WORLDS, random_free_pose
+from firstfix.lab.worlds.catalog import STARTS, WORLDS, random_free_pose
 from firstfix.web.snapshot import SimulationStatus
 
 MOST_PEOPLE = 30
@@ -36,8 +36,10 @@ _REST_S = 3.0
 # At a goal of a person it stays this long, at one of its own this long.
 _GOAL_REST_S = 15.0
 _WANDER_REST_S = 2.0
-# Its sensors need this long to start.
+# Its sensors need this long to start, and it stands as long afterwards. In a world drawn to show
+# one thing it stands until viewers have seen it.
 _START_S = 2.0
+_SHOWN_S = 120.0
 _KIDNAP_CLEARANCE_M = 0.4
 
 
@@ -64,6 +66,7 @@ class SimulatedRobot:
         self._given = world, grid
         self._sensor = next(iter(SENSORS))
         self._is_paused = self._is_covered = False
+        self._starts = 0
         self._plan: Iterator[Moment]
         self._enter(world, grid)
 
@@ -76,6 +79,11 @@ class SimulatedRobot:
     def grid(self) -> OccupancyGrid:
         """The map of the present world."""
         return self._grid
+
+    @property
+    def starts(self) -> int:
+        """How often the simulation was started, also in the same world."""
+        return self._starts
 
     @property
     def status(self) -> SimulationStatus:
@@ -199,7 +207,7 @@ class SimulatedRobot:
             self._simulation.rig = SENSORS[name]
 
     def select_world(self, name: str) -> None:
-        """Restart the simulation in another world.
+        """Restart the simulation in a world, which may be the present one.
 
         Raises
         ------
@@ -216,11 +224,12 @@ class SimulatedRobot:
             self._enter(name, grid)
 
     def _enter(self, world: str, grid: OccupancyGrid) -> None:
-        scenario = Scenario((), rig=SENSORS[self._sensor])
+        scenario = Scenario((), STARTS.get(world), rig=SENSORS[self._sensor])
         self._simulation = start_simulation(scenario, grid, self._seed)
         self._radius_m = scenario.kobuki.radius_m
-        self._plan = self._start()
+        self._plan = self._start(_SHOWN_S if world in STARTS else _START_S)
         self._world, self._grid = world, grid
+        self._starts += 1
 
     def _check(self, place: SE2) -> None:
         self._check_on_floor()
@@ -230,9 +239,9 @@ class SimulatedRobot:
         if self._simulation.robot.lifted:
             raise InputError(f"The robot is being carried. Try again in {_CARRY_S:g} s.")
 
-    def _start(self) -> Iterator[Moment]:
+    def _start(self, stand_s: float) -> Iterator[Moment]:
         yield from Pause(_START_S).run(self._simulation)
-        yield from Stand(_START_S).run(self._simulation)
+        yield from Stand(stand_s).run(self._simulation)
 
     def _drive(self, goal: SE2 | None, rest_s: float) -> Iterator[Moment]:
         with suppress(InputError):  # where no path leads out, it stays

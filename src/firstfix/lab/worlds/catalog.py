@@ -17,6 +17,7 @@ from firstfix.io.maps.map_server import load_map
 from firstfix.lab.worlds.corridor import corridor
 from firstfix.lab.worlds.drawing import MARGIN, RESOLUTION, Drawing
 from firstfix.lab.worlds.floors import RandomFloor
+from firstfix.lab.worlds.hotel import HOTEL_START, hotel
 from firstfix.lab.worlds.house import house
 from firstfix.lab.worlds.office import office
 from firstfix.lab.worlds.warehouse import warehouse
@@ -104,7 +105,11 @@ WORLDS: dict[str, Callable[[], OccupancyGrid]] = {
     "warehouse": warehouse,
     "house": house,
     "corridor": corridor,
+    "hotel": hotel,
 }
+
+STARTS: dict[str, SE2] = {"hotel": HOTEL_START}
+"""Where the robot of the live page starts, in worlds drawn to show one thing; else at random."""
 
 
 def parse_worlds(text: str, known: Collection[str]) -> list[str]:

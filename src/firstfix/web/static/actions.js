@@ -36,8 +36,8 @@ export class Actions {
     byId("relocalize").addEventListener("click", () => this.relocalize());
     byId("pause").addEventListener("click", () => this.togglePause());
     byId("kidnap").addEventListener("click", () => this.kidnap());
-    byId("decide").addEventListener("click", () => this.#send({ type: "decide" }));
-    this.simulation = new Simulation((message) => this.#send(message));
+    byId("decide").addEventListener("click", () => this.send({ type: "decide" }));
+    this.simulation = new Simulation((message) => this.send(message));
   }
 
   /** Show what this viewer may do, from `hello`. */
@@ -114,10 +114,10 @@ export class Actions {
     const { kind, x, y, yaw } = draft;
     const wrapped = Math.atan2(Math.sin(yaw), Math.cos(yaw));
     if (kind === "goal") {
-      if (this.#send({ type: "goal", x, y })) scene.goal = [x, y];
+      if (this.send({ type: "goal", x, y })) scene.goal = [x, y];
     } else {
       scene.goal = null;
-      this.#send({ type: kind, x, y, yaw: wrapped });
+      this.send({ type: kind, x, y, yaw: wrapped });
       this.leaveMode();
     }
     this.onChange();
@@ -125,23 +125,23 @@ export class Actions {
 
   pick(id) {
     if (!this.#maySteer) return;
-    this.#send({ type: "pick", id });
+    this.send({ type: "pick", id });
     this.leaveMode();
   }
 
   relocalize() {
-    if (this.#maySteer) this.#send({ type: "relocalize" });
+    if (this.#maySteer) this.send({ type: "relocalize" });
   }
 
   togglePause() {
     if (!this.#abilities.has("pause")) return;
-    this.#send({ type: "pause", paused: !this.scene.state?.paused });
+    this.send({ type: "pause", paused: !this.scene.state?.paused });
   }
 
   kidnap() {
     if (!this.#abilities.has("kidnap")) return;
     this.scene.goal = null;
-    this.#send({ type: "kidnap" });
+    this.send({ type: "kidnap" });
   }
 
   /** Whether the deciding motion of the state can be executed by a button. */
@@ -153,7 +153,8 @@ export class Actions {
     this.notices.showError("Press where the robot stands, then drag in the direction it faces.");
   }
 
-  #send(message) {
+  /** Send a command; false if there is no connection, which is said. */
+  send(message) {
     const sent = this.connection.send(message);
     if (!sent) this.notices.showError("Not connected. Nothing was sent.");
     return sent;

@@ -13,6 +13,7 @@ import { Sheet } from "./sheet.js";
 import { Renderer } from "./renderer.js";
 import { Theme } from "./theme.js";
 import { Timeline } from "./timeline.js";
+import { Tour } from "./tour.js";
 import { authorization, keepToken, takeTokenFromFragment, token } from "./token.js";
 import { View } from "./view.js";
 import { metres } from "./format.js";
@@ -44,6 +45,7 @@ const connection = new Connection({
   onTokenAsked: askForToken,
 });
 const actions = new Actions(connection, scene, view, notices, redraw);
+const tour = new Tour((message) => actions.send(message));
 const panel = new Panel({
   onPick: (id) => actions.pick(id),
   onHighlight: highlight,
@@ -65,6 +67,7 @@ function greet(hello) {
   scene.clearRobot();
   timeline.replace(hello.events);
   actions.allow(hello);
+  tour.greet(hello);
   document.querySelector("[data-layer=truth]").hidden = hello.robot !== "sim";
   if (hello.map) showMap(hello.map);
 }
@@ -73,6 +76,7 @@ function takeState(state) {
   scene.takeState(state);
   panel.show(state);
   actions.simulation.show(state);
+  tour.show(state);
   byId("decide").hidden = !state.motion || !actions.canDecide;
   app.dataset.pose = numbers(state.pose);
   app.dataset.truth = numbers(state.truth);
@@ -165,7 +169,8 @@ listenToKeys({
     k: () => actions.kidnap(),
     r: () => actions.relocalize(),
     Space: () => actions.togglePause(),
-    escape: () => actions.leaveMode(),
+    t: () => tour.toggle(),
+    escape: () => (scene.mode === "look" ? tour.leave() : actions.leaveMode()),
     "?": () => byId("help-dialog").showModal(),
   },
 });
