@@ -51,14 +51,17 @@ def main() -> None:
         matcher, sensor = ScanMatcher(grid), build_sensor(grid, OFF)
 
         def anywhere(
-            _: LaserScan, n: int, rng: np.random.Generator, grid: OccupancyGrid = grid
+            _: tuple[LaserScan, ...], n: int, rng: np.random.Generator, grid: OccupancyGrid = grid
         ) -> NDArray[np.float64]:
             return free_poses(grid, n, rng)
 
         def likely(
-            scan: LaserScan, n: int, rng: np.random.Generator, matcher: ScanMatcher = matcher
+            scans: tuple[LaserScan, ...],
+            n: int,
+            rng: np.random.Generator,
+            matcher: ScanMatcher = matcher,
         ) -> NDArray[np.float64]:
-            return hypothesis_poses(matcher.locate(scan).hypotheses, n, rng)
+            return hypothesis_poses(matcher.locate(scans).hypotheses, n, rng)
 
         sights = plan_drive(recording, None).sights
         cells = []

@@ -59,7 +59,7 @@ def test_the_model_is_that_of_the_settings(room, model, kind):
 @pytest.mark.parametrize("n", [1, 5, EFFECTIVE_BEAMS])
 def test_few_beams_are_independent(n):
     logs = [-3.0, -1.0, -2.5]
-    likelihood, _ = weigh(three(), beams_of(n), Told(logs, n))
+    likelihood, _ = weigh(three(), [beams_of(n)], Told(logs, n))
     np.testing.assert_allclose(likelihood, np.exp(np.array(logs) + 1.0))
 
 
@@ -67,15 +67,15 @@ def test_few_beams_are_independent(n):
 def test_the_same_beams_many_times_over_are_not_many_times_as_sure(times):
     n = 2 * EFFECTIVE_BEAMS
     logs = np.array([-3.0, -1.0, -2.5]) * n
-    once, fit = weigh(three(), beams_of(n), Told(list(logs), n))
-    often, fits = weigh(three(), beams_of(times * n), Told(list(times * logs), times * n))
+    once, fit = weigh(three(), [beams_of(n)], Told(list(logs), n))
+    often, fits = weigh(three(), [beams_of(times * n)], Told(list(times * logs), times * n))
     np.testing.assert_allclose(often, once)
     assert fits == pytest.approx(fit)
 
 
 def test_the_best_particle_has_likelihood_one_and_none_overflows():
     for best in (-1e6, -5000.0, 0.0, 300.0):
-        likelihood, _ = weigh(three(), beams_of(60), Told([best - 1e5, best, best - 4.0], 60))
+        likelihood, _ = weigh(three(), [beams_of(60)], Told([best - 1e5, best, best - 4.0], 60))
         np.testing.assert_allclose(
             likelihood, [0.0, 1.0, math.exp(-4.0 * EFFECTIVE_BEAMS / 60)], atol=1e-300
         )
@@ -83,12 +83,12 @@ def test_the_best_particle_has_likelihood_one_and_none_overflows():
 
 def test_fit_is_the_geometric_mean_over_the_belief():
     logs = [40 * math.log(0.1), 40 * math.log(0.2), 40 * math.log(0.4)]
-    _, fit = weigh(three(), beams_of(60), Told(logs, 40))
+    _, fit = weigh(three(), [beams_of(60)], Told(logs, 40))
     assert fit == pytest.approx((0.1 * 0.2 * 0.4 * 0.4) ** 0.25)
 
 
 def test_an_uninformative_scan_leaves_all_equally_likely():
-    likelihood, fit = weigh(three(), beams_of(60), Told([0.0, 0.0, 0.0], 0))
+    likelihood, fit = weigh(three(), [beams_of(60)], Told([0.0, 0.0, 0.0], 0))
     assert likelihood.tolist() == [1.0, 1.0, 1.0]
     assert math.isnan(fit)
 
@@ -104,7 +104,7 @@ def test_the_place_of_the_sensor_is_found_where_it_is(room, model):
         truth.as_array() - d for d in np.eye(3) * 0.3
     ]
     likelihood, fit = weigh(
-        equal_weights(np.array([truth.as_array(), *around])), beams, build_sensor(room, config)
+        equal_weights(np.array([truth.as_array(), *around])), [beams], build_sensor(room, config)
     )
     assert likelihood[0] == 1.0
     assert likelihood[1:].max() < 0.5

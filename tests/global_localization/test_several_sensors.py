@@ -10,11 +10,11 @@ import pytest
 
 from firstfix.core.errors import InputError
 from firstfix.core.estimate import Verdict
-from firstfix.core.scan import LaserScan
+from firstfix.core.scan import LaserScan, as_scans
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.beams import usable_beams
 from firstfix.global_localization.scan_matcher import ScanMatcher
-from firstfix.global_localization.sensors import as_scans, at_one_time, instants, joint_beams
+from firstfix.global_localization.sensors import at_one_time, instants, joint_beams
 from firstfix.global_localization.verify import verify
 from firstfix.lab.simulation.lidar import Lidar
 

@@ -17,7 +17,7 @@ from firstfix.core.angles import angle_error
 from firstfix.core.estimate import LocateResult
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Odometry
-from firstfix.core.scan import LaserScan
+from firstfix.core.scan import LaserScan, Scans, as_scans
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.lab.simulation.lidar import Lidar
@@ -243,9 +243,9 @@ def searches(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Note the stamps of all scans that a whole map is searched for."""
     stamps, locate, update = [], ScanMatcher.locate, place_belief.update
 
-    def spy_on_locate(self: ScanMatcher, scan: LaserScan) -> LocateResult:
-        stamps.append(scan.stamp)
-        return locate(self, scan)
+    def spy_on_locate(self: ScanMatcher, scans: Scans) -> LocateResult:
+        stamps.append(as_scans(scans)[0].stamp)
+        return locate(self, scans)
 
     def spy_on_update(belief: Belief, view: View) -> Belief:
         stamps.append(view.scans[0].stamp)

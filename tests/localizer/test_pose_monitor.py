@@ -41,7 +41,7 @@ def searches(hall_locator, monkeypatch) -> list[float]:
     stamps, locate = [], hall_locator.locate
 
     def spy(scan):
-        stamps.append(scan.stamp)
+        stamps.append(scan[0].stamp)
         return locate(scan)
 
     monkeypatch.setattr(hall_locator, "locate", spy)

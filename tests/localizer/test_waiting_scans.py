@@ -56,7 +56,7 @@ def test_scans_do_not_pile_up_where_odometry_has_ended(robot_in, hall_plan):
     for _ in range(100):
         robot.stamp += 0.1
         robot.send(robot.scan())
-    assert len(robot.localizer._scans._waiting) == 40
+    assert len(robot.localizer._scans._instants) == 40
     (pose,) = poses_of(robot.send(Odometry(robot.stamp, robot.T_odom_base)))
     assert pose.stamp == robot.stamp
 

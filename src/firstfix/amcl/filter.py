@@ -18,11 +18,11 @@ from firstfix.amcl.particles import Particles, equal_weights
 from firstfix.amcl.recovery import WeightHistory
 from firstfix.amcl.resampling import systematic
 from firstfix.amcl.sensor import Sensor, weigh
-from firstfix.core.scan import LaserScan
+from firstfix.core.scan import LaserScan, Scans, as_scans
 from firstfix.core.se2 import SE2
 
-Injection = Callable[[LaserScan, int, np.random.Generator], NDArray[np.float64]]
-"""Draws new poses for a scan: x (m), y (m), yaw (rad) in the map frame, shape (n, 3)."""
+Injection = Callable[[tuple[LaserScan, ...], int, np.random.Generator], NDArray[np.float64]]
+"""Draws poses for the scans of one time: x (m), y (m), yaw (rad) in the map, shape (n, 3)."""
 
 # At rest no motion noise separates the copies of a particle, and the belief would shrink to a few
 # points. Scans at rest are redundant, so particles are spread by about the error of map and sensor
@@ -82,7 +82,7 @@ def start(particles: Particles) -> FilterState:
 def step(
     state: FilterState,
     increment: SE2,
-    scan: LaserScan,
+    scans: Scans,
     sensor: Sensor,
     rng: np.random.Generator,
     config: AmclConfig,
@@ -99,8 +99,8 @@ def step(
         The state before.
     increment : SE2
         Odometry since the last step: pose of the base now in the base frame of then.
-    scan : LaserScan
-        What the sensor sees now.
+    scans : LaserScan or sequence of LaserScan
+        What the sensor, or each of several, sees now.
     sensor : Sensor
         The sensor model with its map.
     rng : numpy.random.Generator
@@ -118,7 +118,8 @@ def step(
     particles = propagate(state.particles, increment, config, rng)
     if _at_rest(increment, config):
         particles = _roughened(particles, rng)
-    likelihood, fit = weigh(particles, select_beams(scan, config), sensor)
+    scans = as_scans(scans)
+    likelihood, fit = weigh(particles, [select_beams(scan, config) for scan in scans], sensor)
     particles = particles.reweighed(likelihood)
     # A wall on one side truncates the belief there, and its mean lies off its mode. Estimate the
     # mean from weights with the scan applied twice, which moves it towards the mode.
@@ -128,7 +129,7 @@ def step(
     if updates % config.resample_interval == 0:
         fresh = np.empty((0, 3))
         if history.injected_share > 0.0:
-            fresh = inject(scan, round(history.injected_share * len(particles)), rng)
+            fresh = inject(scans, round(history.injected_share * len(particles)), rng)
             history = WeightHistory()  # or it would inject at every scan until no particle is left
         particles = _resampled(particles, fresh, config, rng)
     return FilterState(particles, clusters, history, updates)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -16,8 +17,8 @@ from firstfix.amcl.ray_model import RayModel
 from firstfix.core.grid import OccupancyGrid
 
 # Neighbouring beams hit the same walls, the same person, the same error of the map. Multiplied as
-# if they were independent, they make a belief overconfident; so all beams of a scan together count
-# as this many effective beams (docs/decisions/0010).
+# if they were independent, they make a belief overconfident; so all beams of one time, whatever
+# their sensor, count together as this many effective beams (docs/decisions/0010).
 EFFECTIVE_BEAMS = 15
 
 
@@ -51,28 +52,32 @@ def build_sensor(grid: OccupancyGrid, config: AmclConfig) -> Sensor:
 
 
 def weigh(
-    particles: Particles, beams: SelectedBeams, sensor: Sensor
+    particles: Particles, scans: Sequence[SelectedBeams], sensor: Sensor
 ) -> tuple[NDArray[np.float64], float]:
-    """Compute the likelihood of a scan at every particle.
+    """Compute the likelihood of the scans of one time at every particle.
 
     Parameters
     ----------
     particles : Particles
         The belief, n particles.
-    beams : SelectedBeams
-        The scan.
+    scans : sequence of SelectedBeams
+        The scan of each sensor; at least one.
     sensor : Sensor
         The sensor model.
 
     Returns
     -------
     tuple of ndarray, shape (n,), and float
-        Likelihood of the scan at each particle, 1 at the best; and the fit of the belief: geometric
-        mean of the likelihoods of the beams, 1/m, NaN if no beam took part.
+        Likelihood of the scans at each particle, 1 at the best; and the fit of the belief:
+        geometric mean of the likelihoods of the beams, 1/m, NaN if no beam took part.
     """
-    logs, used = sensor.log_likelihood(particles, beams)
+    first, *others = scans
+    logs, used = sensor.log_likelihood(particles, first)
+    for beams in others:
+        more_logs, more = sensor.log_likelihood(particles, beams)
+        logs, used = logs + more_logs, used + more
     # No `@`: its order of summation, and so its rounding, may depend on the number of threads.
     mean = float((particles.weight * logs).sum())
     fit = math.exp(mean / used) if used else math.nan
-    share = min(1.0, EFFECTIVE_BEAMS / beams.chosen)
+    share = min(1.0, EFFECTIVE_BEAMS / sum(beams.chosen for beams in scans))
     return np.exp(share * (logs - logs.max())), fit

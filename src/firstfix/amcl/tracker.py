@@ -11,7 +11,7 @@ from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.filter import FilterState, Injection, start, step
 from firstfix.amcl.particles import Particles
 from firstfix.amcl.sensor import Sensor
-from firstfix.core.scan import LaserScan
+from firstfix.core.scan import Scans
 from firstfix.core.se2 import SE2
 
 
@@ -55,7 +55,7 @@ class Tracker:
         self._inject = inject
 
     def begin(
-        self, particles: Particles, T_odom_base: SE2, scan: LaserScan, rng: np.random.Generator
+        self, particles: Particles, T_odom_base: SE2, scans: Scans, rng: np.random.Generator
     ) -> Track:
         """Start with a belief and update it by a first scan.
 
@@ -65,8 +65,8 @@ class Tracker:
             The belief.
         T_odom_base : SE2
             Odometry at the scan.
-        scan : LaserScan
-            The first scan.
+        scans : LaserScan or sequence of LaserScan
+            The first scan, or one of each sensor.
         rng : numpy.random.Generator
             Source of randomness.
 
@@ -75,10 +75,10 @@ class Tracker:
         Track
             After one update.
         """
-        return self.update(Track(start(particles), T_odom_base), T_odom_base, scan, rng)
+        return self.update(Track(start(particles), T_odom_base), T_odom_base, scans, rng)
 
     def follow(
-        self, track: Track, T_odom_base: SE2, scan: LaserScan, rng: np.random.Generator
+        self, track: Track, T_odom_base: SE2, scans: Scans, rng: np.random.Generator
     ) -> Track:
         """Update by a scan if the robot has moved enough since the last update.
 
@@ -88,8 +88,8 @@ class Tracker:
             The track so far.
         T_odom_base : SE2
             Odometry at the scan.
-        scan : LaserScan
-            The next scan.
+        scans : LaserScan or sequence of LaserScan
+            The next scan, or one of each sensor.
         rng : numpy.random.Generator
             Source of randomness.
 
@@ -101,12 +101,12 @@ class Tracker:
         moved = track.T_odom_base.inverse() @ T_odom_base
         far = math.hypot(moved.x, moved.y) >= self._config.update_min_d
         turned = abs(moved.yaw) >= self._config.update_min_a
-        return self.update(track, T_odom_base, scan, rng) if far or turned else track
+        return self.update(track, T_odom_base, scans, rng) if far or turned else track
 
     def update(
-        self, track: Track, T_odom_base: SE2, scan: LaserScan, rng: np.random.Generator
+        self, track: Track, T_odom_base: SE2, scans: Scans, rng: np.random.Generator
     ) -> Track:
         """Update by a scan in any case (Nav2: a no-motion update). Arguments as in `follow`."""
         increment = track.T_odom_base.inverse() @ T_odom_base
-        state = step(track.state, increment, scan, self._sensor, rng, self._config, self._inject)
+        state = step(track.state, increment, scans, self._sensor, rng, self._config, self._inject)
         return Track(state, T_odom_base)

@@ -23,6 +23,10 @@ from firstfix.global_localization.verify import verify
 # More scans at rest add nothing: what moves has moved.
 MOST_AT_REST = 10
 
+# A sensor that is seen from a moving base is at the same place up to this.
+_SAME_MOUNT_M = 0.01
+_SAME_MOUNT_RAD = math.radians(0.5)
+
 
 @dataclass(frozen=True, eq=False)
 class View:
@@ -51,6 +55,11 @@ class View:
                 received="none",
                 remedy="wait for the first scan",
             )
+
+    @property
+    def stamp(self) -> float:
+        """Time of the newest scan, s."""
+        return max(scan.stamp for scan in self.scans)
 
     @classmethod
     def of(cls, scan: LaserScan, T_odom_base: SE2) -> View:
@@ -129,7 +138,7 @@ class Observation:
         """Tell whether a view comes from the same sensors, beam by beam."""
         mine = self.views[-1].scans
         return len(mine) == len(view.scans) and all(
-            _geometry(a) == _geometry(b) for a, b in zip(mine, view.scans, strict=True)
+            _same_geometry(a, b) for a, b in zip(mine, view.scans, strict=True)
         )
 
 
@@ -175,5 +184,12 @@ def motion(start: Observation, end: Observation) -> tuple[float, float]:
     return math.hypot(step[0], step[1]), abs(math.remainder(step[2], 2.0 * math.pi))
 
 
-def _geometry(scan: LaserScan) -> tuple[object, ...]:
-    return (len(scan), scan.angle_min, scan.angle_increment, scan.mounting, scan.T_base_laser)
+def _same_geometry(a: LaserScan, b: LaserScan) -> bool:
+    # Sensors that are moved to one time by odometry come to rest in slightly different places.
+    apart = a.T_base_laser.inverse() @ b.T_base_laser
+    same_place = math.hypot(apart.x, apart.y) <= _SAME_MOUNT_M and abs(apart.yaw) <= _SAME_MOUNT_RAD
+    return same_place and _beams_of(a) == _beams_of(b)
+
+
+def _beams_of(scan: LaserScan) -> tuple[object, ...]:
+    return (scan.sensor, len(scan), scan.angle_min, scan.angle_increment, scan.mounting)

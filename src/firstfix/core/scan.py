@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -11,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from firstfix.core.angles import FULL_TURN
-from firstfix.core.arguments import as_member, as_pose
-from firstfix.core.errors import ScanError
+from firstfix.core.arguments import as_instance, as_member, as_pose
+from firstfix.core.errors import InputError, ScanError
 from firstfix.core.se2 import SE2
 
 MAX_BEAMS = 100_000
@@ -58,6 +59,9 @@ class LaserScan:
     directions : ndarray, shape (n,), or None
         Bearings of a scan that was straightened (`deskew`), seen from above, rad; None for equal
         angles. Made read-only.
+    sensor : str
+        Name of the sensor, such as its frame, where a robot has several. Scans of different sensors
+        that were taken at about the same time are judged together.
 
     Raises
     ------
@@ -93,6 +97,7 @@ class LaserScan:
     mounting: Mounting = Mounting.UPRIGHT
     time_increment: float = 0.0
     directions: NDArray[np.float64] | None = None
+    sensor: str = ""
 
     def __post_init__(self) -> None:
         ranges = _as_ranges(self.ranges)
@@ -181,6 +186,25 @@ class LaserScan:
         r = self.ranges[self.hit].astype(np.float64)
         a = self.bearings[self.hit]
         return self.T_base_laser.apply(np.column_stack([r * np.cos(a), r * np.sin(a)]))
+
+
+Scans = LaserScan | Sequence[LaserScan]
+"""One scan, or one of each sensor of a robot, taken at one time."""
+
+
+def as_scans(scans: Scans) -> tuple[LaserScan, ...]:
+    """Return one scan or several as a tuple.
+
+    Raises
+    ------
+    InputError
+        If there is none, or one is not a LaserScan.
+    """
+    if not isinstance(scans, Sequence):
+        return (as_instance(LaserScan, scans, "scan"),)
+    if len(scans) == 0:
+        raise InputError("There is no scan in the list. Pass one scan of each sensor.")
+    return tuple(as_instance(LaserScan, scan, "scan") for scan in scans)
 
 
 def _as_ranges(ranges: ArrayLike) -> NDArray[np.float32]:

@@ -14,7 +14,7 @@ from firstfix.core.arguments import as_instance, as_member, as_pose
 from firstfix.core.errors import InputError
 from firstfix.core.estimate import Hypothesis, LocateResult, SearchReport, Verdict
 from firstfix.core.grid import OccupancyGrid
-from firstfix.core.scan import LaserScan
+from firstfix.core.scan import LaserScan, Scans, as_scans
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS
@@ -27,7 +27,6 @@ from firstfix.global_localization.scoring import score_poses, search_locally
 from firstfix.global_localization.search import search
 from firstfix.global_localization.searchable import check_positions, check_searchable
 from firstfix.global_localization.sensors import (
-    as_scans,
     at_one_time,
     instants,
     joint_beams,
@@ -111,7 +110,7 @@ class ScanMatcher:
 
     def locate(
         self,
-        scan: LaserScan | Sequence[LaserScan],
+        scan: Scans,
         T_odom_base: Sequence[SE2] | None = None,
         prior: Prior | None = None,
     ) -> LocateResult:
@@ -180,13 +179,13 @@ class ScanMatcher:
             return locate(at_one_time(scans, poses), self.fields, self.config, prior)
         return locate_several(scans, poses, self.fields, prior)
 
-    def score_poses(self, scan: LaserScan, poses: Sequence[SE2]) -> tuple[Hypothesis, ...]:
+    def score_poses(self, scan: Scans, poses: Sequence[SE2]) -> tuple[Hypothesis, ...]:
         """Score poses by a scan: `firstfix.global_localization.scoring.score_poses`.
 
         Parameters
         ----------
-        scan : LaserScan
-            The scan, with the sensor's pose on the robot.
+        scan : LaserScan or sequence of LaserScan
+            The scan, with the sensor's pose on the robot; or one scan of each sensor.
         poses : sequence of SE2
             ``T_map_base`` proposed; at least one.
 
@@ -195,16 +194,15 @@ class ScanMatcher:
         tuple of Hypothesis
             One for each pose; the probability is that of the place against a wrong map.
         """
-        as_instance(LaserScan, scan, "scan")
-        return score_poses(scan, [as_pose(pose, "pose") for pose in poses], self.fields)
+        return score_poses(as_scans(scan), [as_pose(pose, "pose") for pose in poses], self.fields)
 
-    def search_locally(self, scan: LaserScan, T_map_base: SE2) -> Hypothesis:
+    def search_locally(self, scan: Scans, T_map_base: SE2) -> Hypothesis:
         """Find the best pose within about a metre and 40 degrees of a given one.
 
         Parameters
         ----------
-        scan : LaserScan
-            The scan, with the sensor's pose on the robot.
+        scan : LaserScan or sequence of LaserScan
+            The scan, with the sensor's pose on the robot; or one scan of each sensor.
         T_map_base : SE2
             Where to look.
 
@@ -213,8 +211,7 @@ class ScanMatcher:
         Hypothesis
             The best; its probability is that of the place against a wrong map.
         """
-        as_instance(LaserScan, scan, "scan")
-        return search_locally(scan, as_pose(T_map_base, "T_map_base"), self.fields)
+        return search_locally(as_scans(scan), as_pose(T_map_base, "T_map_base"), self.fields)
 
 
 def locate(

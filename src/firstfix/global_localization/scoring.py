@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from firstfix.core.angles import wrap
 from firstfix.core.estimate import Hypothesis
 from firstfix.core.grid import OccupancyGrid
-from firstfix.core.scan import LaserScan
+from firstfix.core.scan import LaserScan, Scans, as_scans
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
-from firstfix.global_localization.beams import Beams, usable_beams
+from firstfix.global_localization.beams import Beams
 from firstfix.global_localization.frames import to_cells
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.sensors import joint_beams
@@ -46,13 +46,13 @@ _SECOND_LOOK = 8
 _OUTSIDE_M = 1.0
 
 
-def score_poses(scan: LaserScan, poses: Sequence[SE2], fields: MapFields) -> tuple[Hypothesis, ...]:
+def score_poses(scans: Scans, poses: Sequence[SE2], fields: MapFields) -> tuple[Hypothesis, ...]:
     """Score poses by how well a scan fits there, allowing for small errors.
 
     Parameters
     ----------
-    scan : LaserScan
-        The scan, with the sensor's pose on the robot.
+    scans : LaserScan or sequence of LaserScan
+        The scan, with the sensor's pose on the robot; or one of each sensor, at one time.
     poses : sequence of SE2
         ``T_map_base`` proposed; at least one.
     fields : MapFields
@@ -65,7 +65,7 @@ def score_poses(scan: LaserScan, poses: Sequence[SE2], fields: MapFields) -> tup
         up to 0.3 m and 10 degrees away. The probability is that of the place against a wrong map,
         as if there were no other. Covariances are zero.
     """
-    beams = usable_beams(scan)
+    scan, beams = joint_beams(as_scans(scans))
     given = np.array([to_cells(fields.grid, scan, pose) for pose in poses])
     refined = _held(refine_on_field(given, beams, fields), given, fields.grid.resolution)
     verification = verify(np.concatenate([refined, given]), beams, fields)
@@ -82,13 +82,13 @@ def score_poses(scan: LaserScan, poses: Sequence[SE2], fields: MapFields) -> tup
     )
 
 
-def search_locally(scan: LaserScan, T_map_base: SE2, fields: MapFields) -> Hypothesis:
+def search_locally(scans: Scans, T_map_base: SE2, fields: MapFields) -> Hypothesis:
     """Find the best pose within about 0.9 m and 40 degrees of a given one.
 
     Parameters
     ----------
-    scan : LaserScan
-        The scan, with the sensor's pose on the robot.
+    scans : LaserScan or sequence of LaserScan
+        The scan, with the sensor's pose on the robot; or one of each sensor, at one time.
     T_map_base : SE2
         Where to look.
     fields : MapFields
@@ -100,7 +100,7 @@ def search_locally(scan: LaserScan, T_map_base: SE2, fields: MapFields) -> Hypot
         The best, refined and with covariance. Its probability is that of the place against a wrong
         map, as if there were no other.
     """
-    beams = usable_beams(scan)
+    scan, beams = joint_beams(as_scans(scans))
     starts = np.array([to_cells(fields.grid, scan, T_map_base @ off) for off in _OFFSETS])
     poses = refine_on_field(starts, beams, fields)
     first = verify(poses, beams.thinned(_FIRST_LOOK_BEAMS), fields).scores

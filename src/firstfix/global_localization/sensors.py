@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from firstfix.core.arguments import as_instance, as_pose
+from firstfix.core.arguments import as_pose
 from firstfix.core.errors import InputError
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
@@ -22,21 +22,6 @@ _SAME_DIRECTION_RAD = 0.1
 # cut to smaller sensors, are wrong in 0.3 % at 360 degrees x 8 m (201 m²), in 0.6 % at 180 degrees
 # x 8 m (100 m²), in 1.5 % at 360 degrees x 3.5 m (38 m²) and in 5 % at 60 degrees x 5 m (13 m²).
 _ENOUGH_M2 = 150.0
-
-
-def as_scans(scans: LaserScan | Sequence[LaserScan]) -> tuple[LaserScan, ...]:
-    """Return one scan or several as a tuple.
-
-    Raises
-    ------
-    InputError
-        If there is none, or one is not a LaserScan.
-    """
-    if not isinstance(scans, Sequence):
-        return (as_instance(LaserScan, scans, "scan"),)
-    if len(scans) == 0:
-        raise InputError("There is no scan in the list. Pass one scan of each sensor.")
-    return tuple(as_instance(LaserScan, scan, "scan") for scan in scans)
 
 
 def at_one_time(scans: Sequence[LaserScan], T_odom_base: Sequence[SE2]) -> tuple[LaserScan, ...]:
@@ -106,7 +91,9 @@ def instants(scans: Sequence[LaserScan]) -> list[list[int]]:
 
 
 def _is_same_sensor(a: LaserScan, b: LaserScan) -> bool:
-    """Compare pose and direction; the number of beams of one sensor may vary."""
+    """Compare name, pose and direction; the number of beams of one sensor may vary."""
+    if a.sensor or b.sensor:
+        return a.sensor == b.sensor
     middle_a, middle_b = (float(scan.bearings[[0, -1]].mean()) for scan in (a, b))
     return a.T_base_laser == b.T_base_laser and abs(middle_a - middle_b) < _SAME_DIRECTION_RAD
 

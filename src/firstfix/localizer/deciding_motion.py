@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from firstfix.core.estimate import Hypothesis
 from firstfix.core.grid import OccupancyGrid
-from firstfix.core.scan import LaserScan
+from firstfix.core.scan import LaserScan, Scans, as_scans
 from firstfix.core.se2 import SE2
 from firstfix.fields.raycast import expected_ranges
 from firstfix.global_localization.verdict import RIVAL_SHARE, log_likelihoods
@@ -44,14 +44,15 @@ _SIDES_RAD = (-0.3, 0.0, 0.3)
 
 
 def deciding_motion(
-    scan: LaserScan, places: Sequence[Hypothesis], grid: OccupancyGrid
+    scans: Scans, places: Sequence[Hypothesis], grid: OccupancyGrid
 ) -> MotionRequest | None:
     """Find the motion that reduces the expected entropy over the places most.
 
     Parameters
     ----------
-    scan : LaserScan
-        The scan that left the places open. It has the field of view and range of the sensor.
+    scans : LaserScan or sequence of LaserScan
+        The scan, or one of each sensor, that left the places open. They have the fields of view and
+        ranges of the sensors.
     places : sequence of Hypothesis
         Most likely first; the first eight that are rivals of the best are compared.
     grid : OccupancyGrid
@@ -65,13 +66,14 @@ def deciding_motion(
     """
     if len(places) < 2:
         return None
+    scans = as_scans(scans)
     rivals = [p for p in places[:_PLACES] if p.probability >= RIVAL_SHARE * places[0].probability]
     poses = [place.pose for place in rivals]
     weights = np.array([place.probability for place in rivals])
     weights /= weights.sum()
     now = _entropy(weights)
     # What the map expects to differ already here, the scan has not decided.
-    here = _expected_entropy(_views(scan, poses, SE2.identity(), grid), weights)
+    here = _expected_entropy(_views(scans, poses, SE2.identity(), grid), weights)
     best, best_worth = None, -math.inf
     for turn in _TURNS:
         room = min(_room_ahead(grid, pose, turn) for pose in poses)
@@ -79,21 +81,21 @@ def deciding_motion(
             if ahead > 0.0 and room < ahead + _ROOM_M:
                 continue
             T_base_moved = SE2(0.0, 0.0, turn) @ SE2(ahead, 0.0, 0.0)
-            gain = here - _expected_entropy(_views(scan, poses, T_base_moved, grid), weights)
+            gain = here - _expected_entropy(_views(scans, poses, T_base_moved, grid), weights)
             worth = gain - _FRACTION_PER_M * ahead * now
             if gain > _LEAST_FRACTION * now and worth > best_worth:
-                best, best_worth = MotionRequest(scan.stamp, turn, ahead, gain), worth
+                best, best_worth = MotionRequest(_stamp(scans), turn, ahead, gain), worth
     return best
 
 
 def advise(
-    scan: LaserScan, places: Sequence[Hypothesis], rivals: int, grid: OccupancyGrid
+    scans: Scans, places: Sequence[Hypothesis], rivals: int, grid: OccupancyGrid
 ) -> tuple[str, MotionRequest | None]:
     """Say what the choice between the places needs.
 
     Parameters
     ----------
-    scan, places, grid
+    scans, places, grid
         As in `deciding_motion`.
     rivals : int
         Number of places that fit about equally well.
@@ -106,8 +108,8 @@ def advise(
         The motion.
     """
     if rivals <= 1:
-        return "", MotionRequest(scan.stamp, _SECOND_LOOK_RAD, 0.0, 0.0)
-    motion = deciding_motion(scan, places, grid)
+        return "", MotionRequest(_stamp(as_scans(scans)), _SECOND_LOOK_RAD, 0.0, 0.0)
+    motion = deciding_motion(scans, places, grid)
     if motion is not None:
         return f"{rivals} places fit about equally well; motion would decide", motion
     identical = f"{rivals} places look identical to this sensor"
@@ -119,10 +121,20 @@ def _room_ahead(grid: OccupancyGrid, T_map_base: SE2, turn: float) -> float:
     return float(expected_ranges(grid, T_map_base, bearings, FARTHEST_M + 1.0).min())
 
 
+def _stamp(scans: tuple[LaserScan, ...]) -> float:
+    return max(scan.stamp for scan in scans)
+
+
 def _views(
+    scans: tuple[LaserScan, ...], poses: Sequence[SE2], T_base_moved: SE2, grid: OccupancyGrid
+) -> NDArray[np.float64]:
+    """Return the ranges expected of all sensors after a motion, shape (places, beams), m."""
+    return np.concatenate([_view(scan, poses, T_base_moved, grid) for scan in scans], axis=1)
+
+
+def _view(
     scan: LaserScan, poses: Sequence[SE2], T_base_moved: SE2, grid: OccupancyGrid
 ) -> NDArray[np.float64]:
-    """Return the ranges expected after a motion, shape (places, beams), m."""
     chosen = np.linspace(0, len(scan) - 1, min(_BEAMS, len(scan))).round().astype(np.int64)
     reach = min(scan.range_max, _REACH_M)
     T_base_laser = T_base_moved @ scan.T_base_laser

@@ -8,6 +8,7 @@ import numpy as np
 
 from firstfix.amcl.particles import Particles
 from firstfix.belief.belief import Belief
+from firstfix.belief.view import View
 from firstfix.core.arguments import as_instance
 from firstfix.core.errors import InputError
 from firstfix.core.estimate import Evidence, Hypothesis, Verdict
@@ -129,8 +130,9 @@ class Localizer:
         if self._state is State.NO_MAP:
             return [self._status(given.stamp, "no map yet")]
         if isinstance(given, LaserScan):
-            self._scans.add(given)
-            return self._use_next_scan()
+            complaint = self._scans.add(given)
+            said = [self._status(given.stamp, complaint)] if complaint is not None else []
+            return [*said, *self._use_next_scan()]
         if isinstance(given, PoseHint):
             return self._take_hint(given)
         if isinstance(given, Reset):
@@ -207,13 +209,12 @@ class Localizer:
         return [self._status(given.stamp, reason)]
 
     def _use_next_scan(self) -> list[Output]:
-        ready = self._scans.pop() if self._state is not State.NO_MAP else None
-        if ready is None:
+        view = self._scans.pop() if self._state is not State.NO_MAP else None
+        if view is None:
             return []
-        scan, T_odom_base = ready
-        if T_odom_base is None:
-            return [self._status(scan.stamp, "a scan is older than all odometry: left out")]
-        if self._state is State.LIFTED or not self._scans.is_valid(scan):
+        if isinstance(view, LaserScan):
+            return [self._status(view.stamp, "a scan is older than all odometry: left out")]
+        if self._state is State.LIFTED or not self._scans.is_valid(view):
             return []
         steps = {
             State.SEARCHING: self._find,
@@ -221,13 +222,13 @@ class Localizer:
             State.VERIFYING_HINT: self._verify_hint,
             State.LOCALIZED: self._follow,
         }
-        return steps[self._state](scan, T_odom_base)
+        return steps[self._state](view)
 
     # ---- one scan in each state
 
-    def _find(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
+    def _find(self, view: View) -> list[Output]:
         """Weigh all places; publish the best one when it is sure."""
-        if not self._weigh(scan, T_odom_base, Pace.AT_REST_TOO):
+        if not self._weigh(view, Pace.AT_REST_TOO):
             return []
         verdict, reason = self._places.belief.verdict, self._places.belief.reason
         best = self._places.places[0] if self._places.places else None
@@ -235,66 +236,66 @@ class Localizer:
         if best is None or verdict is Verdict.NO_MATCH:
             if not is_searching:
                 self._fire(Event.CONTRADICTED)
-            return [self._status(scan.stamp, reason, best.evidence if best else None)]
+            return [self._status(view.stamp, reason, best.evidence if best else None)]
         if verdict is Verdict.UNIQUE:
-            if not self._is_plausible(best, T_odom_base):
+            if not self._is_plausible(best, view.T_odom_base):
                 reason = "one place fits, far from where the pose was lost: waiting for more views"
-                return [self._status(scan.stamp, reason, best.evidence)]
+                return [self._status(view.stamp, reason, best.evidence)]
             event = Event.ONE_PLACE_FITS if is_searching else Event.DECIDED
-            return self._arrive(scan, T_odom_base, best, event, reason)
+            return self._arrive(view, best, event, reason)
         if is_searching:
             self._fire(Event.SEVERAL_PLACES_FIT)
-        return self._list_places(scan)
+        return self._list_places(view)
 
-    def _verify_hint(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
+    def _verify_hint(self, view: View) -> list[Output]:
         """Let the belief judge a pose that was proposed."""
         hint = self._hint
         assert hint is not None  # noqa: S101 - every way into this state brings one
-        if not self._weigh(scan, T_odom_base, Pace.EVERY_SCAN) or self._places.is_blind:
+        if not self._weigh(view, Pace.EVERY_SCAN) or self._places.is_blind:
             reason = f"{hint.source} proposes a pose; the sensor sees too little to verify it"
-            return [self._status(scan.stamp, reason)]
+            return [self._status(view.stamp, reason)]
         verdict, places = self._places.belief.verdict, self._places.places
         if verdict is Verdict.UNIQUE and hint.matches(places[0].pose):
             explained = places[0].evidence.explained
             reason = f"{hint.source} proposed this pose; {explained:.0%} of the beams fit"
-            return self._arrive(scan, T_odom_base, places[0], Event.HINT_CONFIRMED, reason)
+            return self._arrive(view, places[0], Event.HINT_CONFIRMED, reason)
         if verdict is Verdict.AMBIGUOUS and any(hint.matches(place.pose) for place in places):
             self._fire(Event.SEVERAL_PLACES_FIT)
-            return self._list_places(scan)
+            return self._list_places(view)
         reason = f"the pose proposed by {hint.source} does not explain the scan: searching"
-        return [self._restart(scan.stamp, Event.HINT_REJECTED, reason)]
+        return [self._restart(view.stamp, Event.HINT_REJECTED, reason)]
 
-    def _follow(self, scan: LaserScan, T_odom_base: SE2) -> list[Output]:
-        tracked = self._tracker.follow(scan, T_odom_base, force_update=self._update_requested)
+    def _follow(self, view: View) -> list[Output]:
+        tracked = self._tracker.follow(view, force_update=self._update_requested)
         self._update_requested = False
         place, fit = tracked.judgement.place, tracked.judgement.fit
         if fit is Fit.ELSEWHERE:
             away = place.pose.distance_to(tracked.pose.T_map_base)
             if not is_same_place(place.pose, tracked.pose.T_map_base):
                 reason = f"found {away:.1f} m from the tracked pose"
-                return self._arrive(scan, T_odom_base, place, Event.RELOCALIZED, reason)
-            corrected = self._tracker.start(scan.stamp, T_odom_base, place)
+                return self._arrive(view, place, Event.RELOCALIZED, reason)
+            corrected = self._tracker.start(view.stamp, view.T_odom_base, place)
             self._places.restart()  # the wheels slipped: earlier views are not where they seem
-            return [corrected, self._status(scan.stamp, "corrected", place.evidence)]
+            return [corrected, self._status(view.stamp, "corrected", place.evidence)]
         if fit is Fit.CONTRADICTED:
             explained = place.evidence.explained
             reason = f"only {explained:.0%} of the beams fit here, for too long: searching"
-            return [self._restart(scan.stamp, Event.CONTRADICTED, reason, place.evidence)]
+            return [self._restart(view.stamp, Event.CONTRADICTED, reason, place.evidence)]
         if not tracked.is_confirmed:
             reason = f"odometry has leapt, {tracked.fit_in_words}: waiting for a scan that fits"
-            return [self._status(scan.stamp, reason, place.evidence)]
-        revised = self._reconsider(scan, T_odom_base, tracked)
+            return [self._status(view.stamp, reason, place.evidence)]
+        revised = self._reconsider(view, tracked)
         if revised:
             return revised
         reason = self._unless_chosen(tracked.fit_in_words)
-        return [tracked.pose, self._status(scan.stamp, reason, place.evidence)]
+        return [tracked.pose, self._status(view.stamp, reason, place.evidence)]
 
-    def _reconsider(self, scan: LaserScan, T_odom_base: SE2, tracked: Tracked) -> list[Output]:
+    def _reconsider(self, view: View, tracked: Tracked) -> list[Output]:
         """Weigh all places in the background; return what changes if the pose was wrong."""
         pace = self._places.tracking_pace
         if self._chosen_by is not None or tracked.judgement.fit is not Fit.CONSISTENT:
             pace = Pace.EVERY_VIEW
-        if not self._weigh(scan, T_odom_base, pace):
+        if not self._weigh(view, pace):
             return []
         T_map_base = tracked.pose.T_map_base
         support = self._places.support_for(T_map_base)
@@ -303,19 +304,17 @@ class Localizer:
         if support is Support.OTHER_PLACE:
             best, reason = self._places.places[0], self._places.belief.reason
             reason = f"{best.pose.distance_to(T_map_base):.1f} m from the tracked pose {reason}"
-            return self._arrive(scan, T_odom_base, best, Event.RELOCALIZED, reason)
+            return self._arrive(view, best, Event.RELOCALIZED, reason)
         if support is Support.WITHDRAWN:
             self._tracker.stop()
             self._chosen_by = None
             self._fire(Event.REVOKED)
-            return self._list_places(scan)
+            return self._list_places(view)
         return []
 
-    def _arrive(
-        self, scan: LaserScan, T_odom_base: SE2, place: Hypothesis, event: Event, reason: str
-    ) -> list[Output]:
+    def _arrive(self, view: View, place: Hypothesis, event: Event, reason: str) -> list[Output]:
         """Publish where the robot was found, and track it from there."""
-        pose = self._tracker.start(scan.stamp, T_odom_base, place)
+        pose = self._tracker.start(view.stamp, view.T_odom_base, place)
         if event is Event.RELOCALIZED:
             self._hint = None
         if not self._places.places or place is not self._places.places[0]:
@@ -325,8 +324,8 @@ class Localizer:
             self._chosen_by = self._hint.source
         self._places.pose_was_published()
         self._fire(event)
-        initial = InitialPose(scan.stamp, pose.T_map_base, pose.covariance)
-        status = self._status(scan.stamp, self._unless_chosen(reason), place.evidence)
+        initial = InitialPose(view.stamp, pose.T_map_base, pose.covariance)
+        status = self._status(view.stamp, self._unless_chosen(reason), place.evidence)
         return [initial, pose, status]
 
     def _restart(
@@ -354,11 +353,11 @@ class Localizer:
             elsewhere = self._places.belief.elsewhere
         return Status(stamp, self._state, reason, evidence, rivals, self._chosen_by, elsewhere)
 
-    def _weigh(self, scan: LaserScan, T_odom_base: SE2, pace: Pace) -> bool:
+    def _weigh(self, view: View, pace: Pace) -> bool:
         """Update the belief if a scan is due; return whether it was."""
         if self._update_requested:
             pace, self._update_requested = Pace.EVERY_SCAN, False
-        return self._places.update(scan, T_odom_base, pace)
+        return self._places.update(view.scans, view.T_odom_base, pace)
 
     def _is_plausible(self, place: Hypothesis, T_odom_base: SE2) -> bool:
         """Return whether a sure place may be published.
@@ -383,13 +382,13 @@ class Localizer:
         self._tracker.change_frame(before, now)
         return []
 
-    def _list_places(self, scan: LaserScan) -> list[Output]:
+    def _list_places(self, view: View) -> list[Output]:
         """Report the places that are left, and the motion that would decide between them."""
         places, belief = self._places.places, self._places.belief
-        advice, motion = advise(scan, places, self._places.rivals, belief.fields.grid)
+        advice, motion = advise(view.scans, places, self._places.rivals, belief.fields.grid)
         outputs: list[Output] = [
-            Hypotheses(scan.stamp, places, belief.elsewhere),
-            self._status(scan.stamp, advice or belief.reason, places[0].evidence),
+            Hypotheses(view.stamp, places, belief.elsewhere),
+            self._status(view.stamp, advice or belief.reason, places[0].evidence),
         ]
         return [*outputs, motion] if motion is not None else outputs
 

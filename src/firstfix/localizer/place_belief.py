@@ -21,12 +21,13 @@ from firstfix.belief.belief import (
 from firstfix.belief.config import BeliefConfig
 from firstfix.belief.view import View
 from firstfix.core.estimate import Hypothesis, Verdict
-from firstfix.core.scan import LaserScan
+from firstfix.core.scan import Scans, as_scans
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
-from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
+from firstfix.global_localization.beams import FEWEST_HITS
 from firstfix.global_localization.places import is_same_place
 from firstfix.global_localization.prior import Prior
+from firstfix.global_localization.sensors import joint_beams
 from firstfix.global_localization.verdict import count_rivals
 
 # In the background a view each two metres watches a tracked pose at little cost.
@@ -143,13 +144,13 @@ class PlaceBelief:
         """
         self.belief = with_prior(self.belief, prior, self.belief.odometry)
 
-    def update(self, scan: LaserScan, T_odom_base: SE2, pace: Pace) -> bool:
+    def update(self, scans: Scans, T_odom_base: SE2, pace: Pace) -> bool:
         """Predict, and weigh all places by a scan if one is due.
 
         Parameters
         ----------
-        scan : LaserScan
-            The scan.
+        scans : LaserScan or sequence of LaserScan
+            The scan, or one of each sensor.
         T_odom_base : SE2
             Odometry at the scan.
         pace : Pace
@@ -160,15 +161,16 @@ class PlaceBelief:
         bool
             True if the scan was used.
         """
+        view = View(as_scans(scans), T_odom_base)
         moved = self._has_moved(T_odom_base, REST_M, REST_RAD)
-        if not self._is_due(scan, T_odom_base, pace):
+        if not self._is_due(view.stamp, T_odom_base, pace):
             self.belief = predict(self.belief, T_odom_base)
             return False
-        self._used_at = scan.stamp, T_odom_base
-        self.belief = update(self.belief, View.of(scan, T_odom_base))
+        self._used_at = view.stamp, T_odom_base
+        self.belief = update(self.belief, view)
         listed = self.belief.places
         self._places = listed if moved else _in_order_of(self._places, listed)
-        return self.is_blind or _hits(scan) >= FEWEST_HITS
+        return self.is_blind or _hits(view) >= FEWEST_HITS
 
     def pose_was_published(self) -> None:
         """Watch closely at first: the pose may be wrong."""
@@ -209,7 +211,7 @@ class PlaceBelief:
             return Support.WITHDRAWN
         return Support.OPEN
 
-    def _is_due(self, scan: LaserScan, T_odom_base: SE2, pace: Pace) -> bool:
+    def _is_due(self, stamp: float, T_odom_base: SE2, pace: Pace) -> bool:
         if self._used_at is None or pace is Pace.EVERY_SCAN:
             return True
         if pace is Pace.BACKGROUND:
@@ -220,7 +222,7 @@ class PlaceBelief:
             return False
         creeps = self._has_moved(T_odom_base, REST_M, REST_RAD)
         pause = self._rest_period_s * (_CREEPING_PAUSES if creeps else 1.0)
-        return not 0.0 <= scan.stamp - self._used_at[0] < pause
+        return not 0.0 <= stamp - self._used_at[0] < pause
 
     def _has_moved(self, T_odom_base: SE2, distance: float, angle: float) -> bool:
         if self._used_at is None:
@@ -244,5 +246,5 @@ def _rival_ids(places: tuple[Hypothesis, ...]) -> frozenset[int | None]:
     return frozenset(place.id for place in likeliest)
 
 
-def _hits(scan: LaserScan) -> int:
-    return int(np.count_nonzero(usable_beams(scan).hit))
+def _hits(view: View) -> int:
+    return int(np.count_nonzero(joint_beams(view.scans)[1].hit))

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.angles import angle_error, wrap
-from firstfix.core.scan import LaserScan
+from firstfix.core.scan import Scans, as_scans
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
-from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
+from firstfix.global_localization.beams import FEWEST_HITS
 from firstfix.global_localization.frames import to_cells, to_map
 from firstfix.global_localization.refine import refine_on_rays
+from firstfix.global_localization.sensors import joint_beams
 from firstfix.global_localization.verify import verify
 
 # A refinement that moves the pose farther went to another wall, or the estimate is wrong.
@@ -22,7 +23,7 @@ _FARTHEST_RAD = math.radians(10.0)
 
 
 def fuse_with_scan(
-    T_map_base: SE2, covariance: NDArray[np.float64], scan: LaserScan, fields: MapFields
+    T_map_base: SE2, covariance: NDArray[np.float64], scans: Scans, fields: MapFields
 ) -> tuple[SE2, NDArray[np.float64]]:
     """Fuse an estimate with the pose to which a ray refinement takes the scan from there.
 
@@ -36,8 +37,8 @@ def fuse_with_scan(
         Mean of the estimate.
     covariance : ndarray, shape (3, 3)
         Of x (m), y (m), yaw (rad) in the map frame.
-    scan : LaserScan
-        The scan.
+    scans : LaserScan or sequence of LaserScan
+        The scan, or one of each sensor.
     fields : MapFields
         The prepared map.
 
@@ -48,7 +49,7 @@ def fuse_with_scan(
     covariance : ndarray, shape (3, 3)
         Of it.
     """
-    beams = usable_beams(scan)
+    scan, beams = joint_beams(as_scans(scans))
     if np.count_nonzero(beams.hit) < FEWEST_HITS:
         return T_map_base, covariance
     given = to_cells(fields.grid, scan, T_map_base)[None]

@@ -10,11 +10,12 @@ import numpy as np
 
 from firstfix.core.angles import angle_error
 from firstfix.core.estimate import Hypothesis, Verdict
-from firstfix.core.scan import LaserScan
+from firstfix.core.scan import LaserScan, Scans, as_scans
 from firstfix.core.se2 import SE2
-from firstfix.global_localization.beams import FEWEST_HITS, usable_beams
+from firstfix.global_localization.beams import FEWEST_HITS
 from firstfix.global_localization.places import is_same_place
 from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.global_localization.sensors import joint_beams
 from firstfix.localizer.agreement import AgreementCounter
 from firstfix.localizer.config import MonitorConfig
 
@@ -76,13 +77,13 @@ class PoseMonitor:
         self._searched_at: float | None = None
         self._usual_cost = _GOOD_COST
 
-    def judge(self, scan: LaserScan, T_odom_base: SE2, T_map_base: SE2) -> Judgement:
+    def judge(self, scans: Scans, T_odom_base: SE2, T_map_base: SE2) -> Judgement:
         """Judge the tracked pose by a scan; in doubt search nearby, then everywhere.
 
         Parameters
         ----------
-        scan : LaserScan
-            The scan.
+        scans : LaserScan or sequence of LaserScan
+            The scan, or one of each sensor.
         T_odom_base : SE2
             Odometry at the scan.
         T_map_base : SE2
@@ -94,19 +95,21 @@ class PoseMonitor:
             UNINFORMATIVE if the sensor sees too little, as when it is covered. ELSEWHERE needs
             several consecutive scans that agree, CONTRADICTED needs `lost_after_s`.
         """
-        (tracked,) = self._matcher.score_poses(scan, [T_map_base])
-        if np.count_nonzero(usable_beams(scan).hit) < FEWEST_HITS:
+        scans = as_scans(scans)
+        (tracked,) = self._matcher.score_poses(scans, [T_map_base])
+        if np.count_nonzero(joint_beams(scans)[1].hit) < FEWEST_HITS:
             return Judgement(Fit.UNINFORMATIVE, tracked)
         if tracked.score <= self._config.doubtful_cost:
             return self._judge_consistent(tracked, T_odom_base, T_map_base)
-        place = self._better_place(scan, tracked, T_map_base)
+        place = self._better_place(scans, tracked, T_map_base)
         if place is not None and self._is_confirmed(place, T_odom_base):
             return Judgement(Fit.ELSEWHERE, place)
+        stamp = max(scan.stamp for scan in scans)
         if tracked.score <= self._config.contradiction_cost:
             self._contradicted_since = None
         elif self._contradicted_since is None:
-            self._contradicted_since = scan.stamp
-        elif scan.stamp - self._contradicted_since >= self._config.lost_after_s:
+            self._contradicted_since = stamp
+        elif stamp - self._contradicted_since >= self._config.lost_after_s:
             return Judgement(Fit.CONTRADICTED, tracked)
         return Judgement(Fit.DOUBTFUL, tracked)
 
@@ -129,9 +132,9 @@ class PoseMonitor:
         return True
 
     def _better_place(
-        self, scan: LaserScan, tracked: Hypothesis, T_map_base: SE2
+        self, scans: tuple[LaserScan, ...], tracked: Hypothesis, T_map_base: SE2
     ) -> Hypothesis | None:
-        near = self._matcher.search_locally(scan, T_map_base)
+        near = self._matcher.search_locally(scans, T_map_base)
         as_usual = max(_GOOD_COST, _AS_USUAL * self._usual_cost)
         fits = near.score <= min(as_usual, self._config.doubtful_cost, _BETTER * tracked.score)
         off = T_map_base.inverse() @ near.pose
@@ -139,12 +142,13 @@ class PoseMonitor:
             return near
         if tracked.score <= self._config.contradiction_cost:
             return None  # most of the scan fits here: people, or the edge of the map
+        stamp = max(scan.stamp for scan in scans)
         if self._searched_at is not None:
-            waited = scan.stamp - self._searched_at
+            waited = stamp - self._searched_at
             if 0.0 <= waited < self._config.search_period_s:
                 return None
-        self._searched_at = scan.stamp
-        result = self._matcher.locate(scan)
+        self._searched_at = stamp
+        result = self._matcher.locate(scans)
         best = result.best
         if best is None or best.score > self._config.doubtful_cost:
             self._agreement.clear()

@@ -12,6 +12,7 @@ from firstfix.amcl.initial import around_pose
 from firstfix.amcl.particles import Particles
 from firstfix.amcl.sensor import build_sensor
 from firstfix.amcl.tracker import Track, Tracker
+from firstfix.belief.view import View
 from firstfix.core.estimate import Hypothesis
 from firstfix.core.odometry import Odometry
 from firstfix.core.scan import LaserScan
@@ -111,31 +112,30 @@ class PoseTracker:
         """Track nothing."""
         self._track = None
 
-    def follow(self, scan: LaserScan, T_odom_base: SE2, *, force_update: bool) -> Tracked:
+    def follow(self, view: View, *, force_update: bool) -> Tracked:
         """Update the filter by a scan, judge the pose, sharpen it.
 
         Parameters
         ----------
-        scan : LaserScan
-            The scan.
-        T_odom_base : SE2
-            Odometry at the scan.
+        view : View
+            The scan, or one of each sensor, with the odometry.
         force_update : bool
             True to use the scan although the robot has not moved.
         """
         assert self._track is not None  # noqa: S101 - `start` comes first
+        scans, T_odom_base = view.scans, view.T_odom_base
         step = self._filter.update if force_update else self._filter.follow
-        self._track = step(self._track, T_odom_base, scan, self._rng)
+        self._track = step(self._track, T_odom_base, scans, self._rng)
         T_map_base = self._track.T_map_odom @ T_odom_base
         covariance = self._track.state.estimate.covariance
-        judgement = self._monitor.judge(scan, T_odom_base, T_map_base)
+        judgement = self._monitor.judge(scans, T_odom_base, T_map_base)
         if judgement.fit is Fit.CONSISTENT:
             self._has_leapt = False
             T_map_base, covariance = fuse_with_scan(
-                T_map_base, covariance, scan, self._matcher.fields
+                T_map_base, covariance, scans, self._matcher.fields
             )
         T_map_odom = T_map_base @ T_odom_base.inverse()
-        pose = TrackedPose(scan.stamp, T_map_base, covariance, T_map_odom)
+        pose = TrackedPose(view.stamp, T_map_base, covariance, T_map_odom)
         return Tracked(pose, judgement, is_confirmed=not self._has_leapt)
 
     def doubt_odometry(self) -> None:
@@ -153,6 +153,8 @@ class PoseTracker:
         self._monitor = PoseMonitor(self._matcher, self._config.monitor)
 
 
-def _inject_nothing(_: LaserScan, __: int, ___: np.random.Generator) -> NDArray[np.float64]:
+def _inject_nothing(
+    _: tuple[LaserScan, ...], __: int, ___: np.random.Generator
+) -> NDArray[np.float64]:
     """Inject no particles: the monitor finds by search what augmented MCL draws at random."""
     return np.empty((0, 3))

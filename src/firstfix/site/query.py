@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from firstfix.belief.several import check_sequence
 from firstfix.core.arguments import as_pose
 from firstfix.core.errors import InputError
-from firstfix.core.scan import LaserScan
+from firstfix.core.scan import LaserScan, as_scans
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.prior import Prior
-from firstfix.global_localization.sensors import as_scans, at_one_time, instants
+from firstfix.global_localization.sensors import at_one_time, instants
 
 SitePrior = Mapping[str, "Prior | None"]
 """Maps in which the robot may be, and what is known of its pose in each (None: nothing)."""

@@ -71,7 +71,7 @@ class TrackedScan:
 def make_tracker(grid: OccupancyGrid, config: AmclConfig) -> Tracker:
     """Prepare the dynamic stage for a map; recovery, if asked for, draws from all free space."""
 
-    def anywhere(_: LaserScan, n: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    def anywhere(_: tuple[LaserScan, ...], n: int, rng: np.random.Generator) -> NDArray[np.float64]:
         return free_poses(grid, n, rng)
 
     return Tracker(build_sensor(grid, config), config, anywhere)
