@@ -1,4 +1,4 @@
-"""Writes docs/reference/settings.md, and the table of topics in docs/ros.md, from the code.
+"""Writes docs/reference/settings.md, and the tables of docs/ros.md, from the code.
 
 ``python docs/make_settings.py``
 """
@@ -11,10 +11,12 @@ from pathlib import Path
 from firstfix.ros.channels import PARTICLES, published_topics, subscribed_topics
 from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.parameters import Parameter, parameters
+from firstfix.ros.services import WAIT, ros1_services, ros2_services
 
 PAGE = Path(__file__).parent / "reference" / "settings.md"
 ROS_PAGE = Path(__file__).parent / "ros.md"
 MARK = "<!-- topics, by docs/make_settings.py -->"
+SERVICES_MARK = "<!-- services, by docs/make_settings.py -->"
 HEAD = """# Settings
 
 Of the nodes (`firstfix ros1`, `ros2`, `dds`), as private parameters; and of `firstfix track
@@ -45,10 +47,25 @@ def topics() -> str:
     return MARK + "\n" + "".join(lines) + MARK
 
 
-def with_topics(text: str) -> str:
-    """Return a page with the table of topics between its marks brought up to date."""
-    before, _, after = text.split(MARK)
-    return before + topics() + after
+def services() -> str:
+    """Return the table of services between its marks in docs/ros.md."""
+    full, bootstrap = (NodeConfig(mode=mode, yaml_filename="map.yaml") for mode in Mode)
+    ros2 = [*ros2_services(full), WAIT]
+    ros1 = [*ros1_services(bootstrap), *ros1_services(full)]
+    rows = [("ROS 2", service) for service in ros2] + [("ROS 1", service) for service in ros1]
+    lines = ["| | service | type | offered | does |\n|---|---|---|---|---|\n"]
+    for ros, s in dict.fromkeys(rows):
+        offered = s.condition or "always"
+        lines.append(f"| {ros} | `{s.name}` | `{s.type_name}` | {offered} | {s.request.value} |\n")
+    return SERVICES_MARK + "\n" + "".join(lines) + SERVICES_MARK
+
+
+def with_tables(text: str) -> str:
+    """Return docs/ros.md with the tables between their marks brought up to date."""
+    for mark, table in ((MARK, topics()), (SERVICES_MARK, services())):
+        before, _, after = text.split(mark)
+        text = before + table + after
+    return text
 
 
 def _row(parameter: Parameter) -> str:
@@ -72,4 +89,4 @@ def _range(parameter: Parameter) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(page(), encoding="utf-8")
-    ROS_PAGE.write_text(with_topics(ROS_PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    ROS_PAGE.write_text(with_tables(ROS_PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -45,7 +45,7 @@ def test_settings_are_those_of_the_dataclasses():
 
 def test_the_table_of_topics_is_current():
     page = (DOCS / "ros.md").read_text(encoding="utf-8")
-    assert page == script("make_settings").with_topics(page), "run: python docs/make_settings.py"
+    assert page == script("make_settings").with_tables(page), "run: python docs/make_settings.py"
 
 
 def test_the_import_graph_is_current():

@@ -57,6 +57,12 @@ def test_the_launch_file_of_the_example_is_installed() -> None:
     assert (ROOT / "ros" / "launch" / name).is_file()
 
 
+def test_the_recovery_on_the_page_is_the_installed_one() -> None:
+    (text,) = re.findall(r"```xml\n(.*?)```", PAGE, re.DOTALL)
+    installed = (ROOT / "ros" / "behavior_trees" / "relocalize.xml").read_text()
+    assert "".join(text.split()) in "".join(installed.split())
+
+
 def test_keys_of_the_status_are_those_of_the_node() -> None:
     code = (ROOT / "src" / "firstfix" / "ros" / "output_publisher.py").read_text()
     chapter = PAGE.split("### Keys of `localization_status`")[1].split("\n## ")[0]

@@ -2,7 +2,8 @@
 
 Such a line is JSON: ``flaws`` (names of `FLAWS`, instead of those before), ``shift`` (x, y, yaw:
 the map moves by that much, the robot does not), ``ask`` (a service without arguments), ``hint``
-(x, y, yaw: a person publishes a hint), ``gone`` (that person), ``go`` (on with the script).
+(x, y, yaw: a person publishes a hint), ``gone`` (that person), ``go`` (on with the script),
+``load`` (the path of a map for the node), ``set`` (the map, and x, y, yaw in it).
 After each, map and fixed transforms are published anew.
 """
 
@@ -132,6 +133,13 @@ class Robot:
         if "ask" in command:
             rospy.wait_for_service(command["ask"], timeout=10.0)
             rospy.ServiceProxy(command["ask"], Empty)()
+        if "load" in command:
+            load = rospy.ServiceProxy("firstfix/load_map", nav_msgs.srv.LoadMap)
+            sys.stdout.write(f"load_map: {load(command['load']).result}\n")
+        if "set" in command:
+            where = SE2(*command["set"])
+            pose = pose_with_covariance(make, 0.0, "map", where, np.diag([0.25, 0.25, 0.07]))
+            rospy.ServiceProxy("set_map", nav_msgs.srv.SetMap)(self.map(), pose)
 
     def listen(self) -> None:
         """Execute commands from stdin."""

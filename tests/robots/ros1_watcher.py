@@ -24,6 +24,7 @@ TYPES = {
     "scan": "sensor_msgs/LaserScan",
     "/tf": "tf2_msgs/TFMessage",
     "events/wheel_drop": "kobuki/WheelDropEvent",
+    "map_id": "std_msgs/String",
     "/rosout_agg": "rosgraph_msgs/Log",
 }
 
@@ -69,6 +70,7 @@ READERS = {
     "sensor_msgs/LaserScan": lambda _: {},
     "tf2_msgs/TFMessage": of_transforms,
     "kobuki/WheelDropEvent": of_event,
+    "std_msgs/String": lambda message: {"data": message.data},
     "rosgraph_msgs/Log": of_log,
 }
 

@@ -23,7 +23,7 @@ STAND_IN = Path(__file__).parent / "rclpy_stand_in"
 OURS = (
     "rclpy",
     *(f"rclpy.{path.stem}" for path in (STAND_IN / "rclpy").glob("*.py")),
-    *(f"firstfix.ros.ros2.{name}" for name in ("bond", "node", "transport", "types")),
+    *(f"firstfix.ros.ros2.{name}" for name in ("bond", "localized", "node", "transport", "types")),
 )
 ALL = ("bond", "nav2_msgs", "kobuki_ros_interfaces", "visualization_msgs")
 # The wheels never turn: a change of the pose means that the robot is carried.
@@ -67,11 +67,18 @@ class Lab:
             durability=kept.TRANSIENT_LOCAL if is_latched else kept.VOLATILE,
         )
 
+    def listen(
+        self, topic: str, type_name: str, receive: Callable[[Any], None], **quality: Any
+    ) -> None:
+        """Call a function with what is published."""
+        kind = self.types.find("msg", type_name)
+        self.world.listen(kind, topic, self.quality(**quality), receive)
+
     def subscribe(self, topic: str, type_name: str, **quality: Any) -> list[Any]:
         """Return a list that grows with what is published."""
-        return self.world.subscribe(
-            self.types.find("msg", type_name), topic, self.quality(**quality)
-        )
+        received: list[Any] = []
+        self.listen(topic, type_name, received.append, **quality)
+        return received
 
     def advertise(self, topic: str, type_name: str, **quality: Any) -> Any:
         """Return a publisher."""

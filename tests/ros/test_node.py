@@ -1,6 +1,9 @@
 """A whole node on real messages, with its real worker; only the wire is a recorder."""
 
+import re
 import threading
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,9 +20,10 @@ from firstfix.io.ros_messages.outgoing import occupancy_grid, pose_with_covarian
 from firstfix.localizer.inputs import NewMap, PoseHint, Reset
 from firstfix.localizer.states import State
 from firstfix.ros import node as node_module
-from firstfix.ros.channels import AMCL_POSE, INITIAL_POSE, STATUS, Channel
+from firstfix.ros.channels import AMCL_POSE, INITIAL_POSE, MAP_ID, STATUS, Channel
 from firstfix.ros.node import Node
 from firstfix.ros.node_config import Mode, NodeConfig
+from firstfix.ros.services import Request
 from firstfix.ros.transport import Severity
 
 THERE = SE2(4.0, 3.0, 1.0)
@@ -226,6 +230,34 @@ def test_a_map_that_cannot_be_searched_leaves_the_one_in_use(run, robot, recorde
     assert len(running.given(NewMap)) == 1
     assert running.state is State.LOCALIZED
     assert "a map with walls and free space" in recorder.logged(Severity.WARNING)[0]
+
+
+def test_the_name_of_the_map_comes_before_any_pose_in_it(run, robot, recorder, ros2, hall_plan):
+    running = run(mode=Mode.FULL, map_id="lobby")
+    running.introduce(robot)
+    wait_for(lambda: running.state is State.LOCALIZED)
+    running.receive(Channel.MAP, robot.map())  # a map server repeats its map
+    moved = replace(hall_plan, T_map_grid=SE2(5.0, 0.0, 0.0))
+    running.receive(Channel.MAP, occupancy_grid(ros2.make, 3.0, "map", moved))
+    running.wait_until_handled(NewMap, 2)
+    robot.move()
+    robot.report(running.receive)
+    wait_for(lambda: len(running.given(LaserScan)) > 1 and running.state is State.LOCALIZED)
+    first, second = (message.data for message in recorder.on(MAP_ID))
+    assert first == "lobby"
+    assert re.fullmatch("[0-9a-f]{12}", second)
+    order = [topic for topic, _ in recorder.published if topic in (MAP_ID, AMCL_POSE)]
+    assert order[:2] == [MAP_ID, AMCL_POSE]
+    assert order.index(AMCL_POSE, order.index(MAP_ID, 1)) > order.index(MAP_ID, 1)
+
+
+def test_a_map_and_a_pose_in_it_can_be_set(run, robot, recorder):
+    running = run(mode=Mode.FULL)
+    hint = pose_with_covariance(robot.wire.make, 0.0, "map", THERE, np.eye(3))
+    request = SimpleNamespace(map=robot.map(), initial_pose=hint)
+    assert running.node.answer(Request.SET_MAP, request) == {"success": True}
+    running.wait_until_handled(PoseHint)
+    assert len(running.given(NewMap)) == 1
 
 
 def test_settings_out_of_their_range_make_no_node():

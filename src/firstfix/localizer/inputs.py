@@ -22,6 +22,8 @@ class NewMap:
         Time, s.
     grid : OccupancyGrid
         The map.
+    map_id : str
+        Its name, such as that of a floor. The localizer does not use it; nodes publish it.
 
     Examples
     --------
@@ -32,6 +34,7 @@ class NewMap:
 
     stamp: float
     grid: OccupancyGrid
+    map_id: str = ""
 
     def __post_init__(self) -> None:
         as_instance(OccupancyGrid, self.grid, "grid")

@@ -90,6 +90,12 @@ LOCALIZED = Topic(
     Delivery.LATCHED,
     "true while the pose can be used; published when it changes",
 )
+MAP_ID = Topic(
+    "map_id",
+    "std_msgs/String",
+    Delivery.LATCHED,
+    "the name of the map in use, before any pose in it",
+)
 STATUS = Topic(
     "localization_status",
     "diagnostic_msgs/DiagnosticArray",
@@ -154,6 +160,6 @@ def published_topics(config: NodeConfig, particles: Topic) -> tuple[Topic, ...]:
         All of them.
     """
     if config.mode is Mode.BOOTSTRAP:
-        return INITIAL_POSE, HYPOTHESES, MARKERS, LOCALIZED, STATUS
+        return MAP_ID, INITIAL_POSE, HYPOTHESES, MARKERS, LOCALIZED, STATUS
     moved = [TF] if config.tf_broadcast else []
-    return (AMCL_POSE, particles, HYPOTHESES, MARKERS, LOCALIZED, STATUS, *moved)
+    return (MAP_ID, AMCL_POSE, particles, HYPOTHESES, MARKERS, LOCALIZED, STATUS, *moved)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter, deque
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 from firstfix.core.errors import InputError
@@ -32,6 +33,8 @@ from firstfix.ros.node_config import NodeConfig
 _LAG_S = 1.0
 # Scans that wait for the transform of a sensor that moves on its robot.
 _MAX_WAITING = 40
+# Characters of a hash that names a map.
+_ID_LENGTH = 12
 
 _KINDS = {
     Channel.CLIFF: SignalKind.CLIFF,
@@ -39,6 +42,17 @@ _KINDS = {
     Channel.BUMPER: SignalKind.BUMPER,
     Channel.KIDNAPPED: SignalKind.PICKED_UP,
 }
+
+
+@dataclass(frozen=True, slots=True)
+class _Map:
+    """The map in use: key of its content, and name."""
+
+    key: str
+    map_id: str
+
+
+_NO_MAP = _Map("", "")
 
 
 class MessageConverter:
@@ -67,7 +81,7 @@ class MessageConverter:
         self._dropped: Counter[str] = Counter()
         self._lags_since: float | None = None
         self._pressed: set[tuple[Channel, int]] = set()
-        self._map_key = self._map_key_before = ""
+        self._map = self._map_before = _NO_MAP
 
     def convert(self, channel: Channel, message: Any) -> list[Input]:
         """Convert a message.
@@ -104,7 +118,7 @@ class MessageConverter:
         if channel is Channel.INITIAL_POSE:
             return self._convert_hint(message)
         if channel is Channel.INPUT:
-            return self.use_map(message) if isinstance(message, NewMap) else [message]
+            return self._convert_input(message)
         if channel is Channel.RESET:
             return [self._reset()]
         if channel is Channel.UPDATE:
@@ -112,16 +126,18 @@ class MessageConverter:
         return self._convert_event(channel, message)
 
     def use_map(self, given: NewMap) -> list[Input]:
-        """Return a map unless it is the one in use: map servers repeat theirs."""
+        """Return a map with its name, unless it is the one in use: map servers repeat theirs."""
         key = map_key(given.grid)
-        if key == self._map_key:
+        if self._map.key == key and given.map_id in ("", self._map.map_id):
             return []
-        self._map_key_before, self._map_key = self._map_key, key
-        return [given]
+        own_name = self._config.map_id if self._map is _NO_MAP else ""
+        named = _Map(key, own_name or given.map_id or key[:_ID_LENGTH])
+        self._map_before, self._map = self._map, named
+        return [replace(given, map_id=named.map_id)]
 
     def restore_map(self) -> None:
         """Return to the previous map: the last one cannot be searched."""
-        self._map_key = self._map_key_before
+        self._map = self._map_before
 
     @property
     def _now(self) -> float:
@@ -131,6 +147,11 @@ class MessageConverter:
     def _reset(self) -> Reset:
         self._pressed.clear()
         return Reset(self._now)
+
+    def _convert_input(self, given: Input) -> list[Input]:
+        if not isinstance(given, NewMap):
+            return [given]
+        return self.use_map(replace(given, stamp=max(given.stamp, self._now)))
 
     def _convert_scan(self, message: Any) -> list[Input]:
         stamp, frame = self._stamps.add(message.header.stamp), to_frame(message.header.frame_id)
@@ -192,7 +213,7 @@ class MessageConverter:
             return self._drop(f"a scan cannot be used: {error}")
 
     def _convert_map(self, message: Any) -> list[Input]:
-        if self._map_key and self._config.first_map_only:
+        if self._map is not _NO_MAP and self._config.first_map_only:
             return []
         frame, expected = to_frame(message.header.frame_id), self._config.global_frame_id
         if frame != expected:

@@ -7,14 +7,14 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from firstfix.core.errors import InputError, MapError
 from firstfix.core.scan import LaserScan
 from firstfix.fields.cache import cache_folder
-from firstfix.global_localization.searchable import check_searchable
-from firstfix.io.maps.map_server import load_map
+from firstfix.io.ros_messages.outgoing import occupancy_grid
 from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Output
@@ -22,10 +22,12 @@ from firstfix.localizer.precompile import precompile
 from firstfix.ros.channels import Channel, subscribed_topics
 from firstfix.ros.exact_stamps import ExactStamps
 from firstfix.ros.inbox import Inbox
+from firstfix.ros.map_files import map_from, path_of, result_of
 from firstfix.ros.message_converter import MessageConverter
 from firstfix.ros.node_config import NodeConfig
 from firstfix.ros.output_publisher import OutputPublisher
 from firstfix.ros.pose_memory import PoseMemory
+from firstfix.ros.services import LoadResult, Request
 from firstfix.ros.transport import Severity, Transport
 
 Watcher = Callable[[Input, list[Output], Localizer], None]
@@ -81,9 +83,7 @@ class Node:
             If the map file cannot be used.
         """
         if self._config.yaml_filename:
-            grid = load_map(Path(self._config.yaml_filename))
-            check_searchable(grid)
-            self._map = NewMap(0.0, grid)
+            self._map = map_from(Path(self._config.yaml_filename))
         self.expects_topics_since = time.monotonic()
         self._worker.start()
 
@@ -113,6 +113,35 @@ class Node:
         """Queue an input that needs no conversion, such as a hint from the live page."""
         self.receive(Channel.INPUT, given)
 
+    def answer(self, request: Request, message: Any) -> dict[str, Any]:
+        """Handle the request of a service; returns at once, except for a map that is loaded.
+
+        Parameters
+        ----------
+        request : Request
+            What the service does.
+        message : message
+            Its request.
+
+        Returns
+        -------
+        dict
+            The fields of its response; those that are missing keep their defaults.
+        """
+        if request is Request.SEARCH:
+            self.receive(Channel.RESET)
+        elif request is Request.UPDATE:
+            self.receive(Channel.UPDATE)
+        elif request is Request.HINT:
+            self.receive(Channel.INITIAL_POSE, message.pose)
+        elif request is Request.SET_MAP:
+            self.receive(Channel.MAP, message.map)
+            self.receive(Channel.INITIAL_POSE, message.initial_pose)
+            return {"success": True}
+        elif request is Request.LOAD_MAP:
+            return self._load_map(str(message.map_url))
+        return {}
+
     def warn_throttled(
         self, subject: str, text: str, severity: Severity = Severity.WARNING
     ) -> None:
@@ -131,6 +160,17 @@ class Node:
         if now - self._logged_at.get(subject, -_REPEAT_S) >= _REPEAT_S:
             self._logged_at[subject] = now
             self._transport.log(severity, text)
+
+    def _load_map(self, url: str) -> dict[str, Any]:
+        try:
+            loaded = map_from(path_of(url))
+        except MapError as error:
+            self.warn_throttled(f"map {url}", f"{error}")
+            return {"result": int(_refusal(url))}
+        self.give(loaded)
+        frame = self._config.global_frame_id
+        grid = occupancy_grid(self._transport.make, 0.0, frame, loaded.grid)
+        return {"result": int(LoadResult.SUCCESS), "map": grid}
 
     def _work(self) -> None:
         self._try(self._prepare)
@@ -183,6 +223,7 @@ class Node:
             raise
         if isinstance(given, NewMap):
             self._map = given
+            self._publisher.publish_map_id(given.map_id)
         self._publish(given, outputs)
 
     def _replace_localizer(self, given: Input) -> None:
@@ -193,7 +234,7 @@ class Node:
         if isinstance(given, NewMap):
             self._converter.restore_map()
         if self._map is not None:
-            known = NewMap(given.stamp, self._map.grid)
+            known = replace(self._map, stamp=given.stamp)
             self._publish(known, self._localizer.handle(known))
 
     def _publish(self, given: Input, outputs: list[Output]) -> None:
@@ -231,6 +272,13 @@ class Node:
                 self.warn_throttled(channel.value, text)
         # A map comes once. Missing odometry is reported with each scan.
         self._received &= {Channel.MAP}
+
+
+def _refusal(url: str) -> LoadResult:
+    try:
+        return result_of(path_of(url))
+    except MapError:
+        return LoadResult.MAP_DOES_NOT_EXIST
 
 
 MakeNode = Callable[[NodeConfig, Transport], Node]

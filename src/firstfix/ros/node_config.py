@@ -34,6 +34,11 @@ class NodeConfig:
         "bootstrap: publish initialpose for a separate AMCL; full: replace AMCL",
     )
     yaml_filename: str = setting("", "map file to load; empty: use map_topic")
+    map_id: str = setting(
+        "",
+        "name of the first map, published on map_id; empty: the name of its file, or a hash of its "
+        "cells",
+    )
     base_frame_id: str = setting("base_footprint", "frame of the base")
     odom_frame_id: str = setting("odom", "frame of the odometry")
     global_frame_id: str = setting("map", "frame of the map")

@@ -33,6 +33,7 @@ from firstfix.ros.channels import (
     HYPOTHESES,
     INITIAL_POSE,
     LOCALIZED,
+    MAP_ID,
     MARKERS,
     STATUS,
     TF,
@@ -107,6 +108,10 @@ class OutputPublisher:
                 self._publish_places(output.stamp, [(p.pose, p.probability) for p in output.places])
             elif isinstance(output, Status):
                 self._publish_status(output)
+
+    def publish_map_id(self, map_id: str) -> None:
+        """Publish the name of the map in use."""
+        self._transport.publish(MAP_ID, self._transport.make("std_msgs/String", data=map_id))
 
     def is_own(self, message: Any) -> bool:
         """Return whether an initial pose was published here."""

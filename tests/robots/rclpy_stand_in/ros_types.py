@@ -60,6 +60,8 @@ def modules(optional: Iterable[str]) -> dict[str, ModuleType]:
     if "nav2_msgs" in packages:
         pose = classes["geometry_msgs/msg/PoseWithCovarianceStamped"]
         found["nav2_msgs.srv"].SetInitialPose = _service({"pose": pose}, {})
+        grid = classes["nav_msgs/msg/OccupancyGrid"]
+        found["nav2_msgs.srv"].LoadMap = _service({"map_url": str}, {"map": grid, "result": int})
     return found
 
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import sys
 import time
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ros1_lab import Lab, wait_until
+from ros1_lab import Lab, apart, wait_until
 
+from firstfix.core.se2 import SE2
 from firstfix.io.maps.map_server import save_map
 from firstfix.lab.worlds.catalog import WORLDS
 
@@ -121,3 +123,26 @@ def test_the_map_comes_from_its_configured_source(ros1: Lab, source: str, tmp_pa
         ros1.node(f"_yaml_filename:={tmp_path / 'office.yaml'}")
         ros1.robot("stand", "--flaws", "no map")
     assert ros1.error_of(watcher.wait_for("initialpose")).is_small
+
+
+def test_another_map_is_used_on_request_and_named(ros1: Lab, tmp_path: Path) -> None:
+    office = WORLDS["office"]()
+    shift = SE2(10.0, -5.0, 1.5)
+    save_map(office, tmp_path / "floor1.yaml")
+    save_map(replace(office, T_map_grid=shift @ office.T_map_grid), tmp_path / "floor2.yaml")
+    watcher = ros1.watch("amcl_pose", "map_id")
+    ros1.node("_mode:=full", f"_yaml_filename:={tmp_path / 'floor1.yaml'}")
+    robot = ros1.robot("stand", "--flaws", "no map")
+    assert ros1.error_of(watcher.wait_for("amcl_pose")).is_small
+    robot.command(load=str(tmp_path / "floor2.yaml"))
+    second = watcher.wait_for("map_id", data="floor2")
+    there = watcher.wait_for("amcl_pose", after=second["at"])
+    assert apart(there, shift @ ros1.truth_at(there["stamp"])).is_small
+    truth = ros1.truth_at(there["stamp"])
+    robot.command(set=[truth.x, truth.y, truth.yaw])  # the map of the robot, which was not moved
+    third = wait_until(lambda: watcher.lines("map_id")[2:], lambda: robot.output)[0]
+    assert ros1.error_of(watcher.wait_for("amcl_pose", after=third["at"])).is_small
+    assert [line["data"] for line in watcher.lines("map_id")][:2] == ["floor1", "floor2"]
+    robot.wait_for_output("load_map: 0")
+    robot.command(load=str(tmp_path / "floor3.yaml"))
+    robot.wait_for_output("load_map: 1")

@@ -3,14 +3,17 @@
 import importlib
 import math
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from ros2_lab import Lab, Robot
+from ros2_lab import Lab, Robot, wait_until
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
+from firstfix.io.maps.map_server import save_map
 from firstfix.io.ros_messages.incoming import to_planar, to_pose
 from firstfix.io.ros_messages.outgoing import pose_with_covariance
 from firstfix.ros.channels import PARTICLES, published_topics, subscribed_topics
@@ -90,6 +93,80 @@ def test_a_wheel_drop_restarts_the_search(lab: Lab, states) -> None:
     assert "SEARCHING" in {state_of(m) for m in received}
 
 
+def test_a_map_can_be_loaded_and_another_one_from_the_map_server_is_followed(
+    lab: Lab, hall_plan: OccupancyGrid, tmp_path: Path
+) -> None:
+    save_map(hall_plan, tmp_path / "floor1.yaml")
+    shifted = replace(hall_plan, T_map_grid=SE2(10.0, 0.0, 0.0) @ hall_plan.T_map_grid)
+    save_map(shifted, tmp_path / "floor2.yaml")
+    load = lab.types.find("srv", "nav2_msgs/LoadMap")
+    node = lab.node("-p", f"yaml_filename:={tmp_path / 'floor1.yaml'}", "-p", "mode:=full")
+    robot = Robot(lab, hall_plan, HERE)
+    order: list[Any] = []
+    lab.listen("map_id", "std_msgs/String", lambda m: order.append(m.data), is_latched=True)
+    lab.listen("amcl_pose", POSE, order.append, is_latched=True)
+    node.trigger_configure()
+    early = lab.world.ask("~/load_map", load.Request(map_url="nowhere"))
+    assert early.result == 255
+    # Its name is published before the node is active, and must not be lost.
+    wait_until(lambda: any("SEARCHING" in line for line in lab.world.lines("info")))
+    node.trigger_activate()
+    robot.look_until(lambda: order and not isinstance(order[-1], str))
+    done = lab.world.ask("~/load_map", load.Request(map_url=f"file://{tmp_path}/floor2.yaml"))
+    assert (done.result, done.map.info.width) == (0, shifted.width)
+    robot.look_until(lambda: "floor2" in order and not isinstance(order[-1], str))
+    names = [each for each in order if isinstance(each, str)]
+    assert names == ["floor1", "floor2"]
+    assert order[0] == "floor1"
+    in_first, in_second = order[order.index("floor2") - 1], order[order.index("floor2") + 1]
+    assert to_planar(to_pose(in_first)).x == pytest.approx(HERE.x, abs=0.1)
+    assert to_planar(to_pose(in_second)).x == pytest.approx(HERE.x + 10.0, abs=0.1)
+
+
+def test_a_map_that_cannot_be_loaded_leaves_the_one_in_use(
+    lab: Lab, hall_plan: OccupancyGrid, tmp_path: Path
+) -> None:
+    save_map(hall_plan, tmp_path / "hall.yaml")
+    load = lab.types.find("srv", "nav2_msgs/LoadMap")
+    node = lab.node("-p", f"yaml_filename:={tmp_path / 'hall.yaml'}")
+    node.trigger_configure()
+    node.trigger_activate()
+    for url, result in (
+        (str(tmp_path / "missing.yaml"), 1),
+        ("package://maps/floor2.yaml", 1),
+        ("\0", 1),
+        (str(tmp_path / "hall.pgm"), 3),
+    ):
+        assert lab.world.ask("~/load_map", load.Request(map_url=url)).result == result
+    (tmp_path / "hall.pgm").write_bytes(b"P5\n400 400\n255\n")
+    request = load.Request(map_url=str(tmp_path / "hall.yaml"))
+    assert lab.world.ask("~/load_map", request).result == 2
+    assert len(lab.world.lines("warning")) == 5
+
+
+def test_only_a_node_that_loads_its_map_offers_to_load_another(lab: Lab) -> None:
+    lab.node().trigger_configure()
+    assert "~/load_map" not in lab.world.services
+
+
+def test_a_behaviour_tree_can_wait_until_the_robot_is_localized(lab: Lab, states) -> None:
+    robot, received = states
+    with pytest.raises(StopIteration):
+        lab.world.ask("wait_until_localized").send(None)
+    lab.world.ask("reinitialize_global_localization")
+    answer = lab.world.ask("wait_until_localized")
+    answer.send(None)  # not yet: the search that was asked for has not begun
+    robot.look_until(lambda: received and state_of(received[-1]) == "LOCALIZED")
+    with pytest.raises(StopIteration) as end:
+        answer.send(None)
+    assert isinstance(end.value.value, lab.types.find("srv", "std_srvs/Empty").Response)
+    lab.nodes[0].trigger_deactivate()
+    lab.nodes[0].trigger_cleanup()
+    late = lab.world.ask("wait_until_localized")
+    late.send(None)
+    late.close()
+
+
 def test_services_that_come_too_early_have_no_effect(lab: Lab) -> None:
     lab.node().trigger_configure()
     lab.world.ask("reinitialize_global_localization")
@@ -117,6 +194,7 @@ def test_messages_after_the_end_are_dropped(lab: Lab) -> None:
     again = transport.Ros2(lab.nodes[0], config)
     lab.nodes[0].on_activate(None)
     lab.rclpy.try_shutdown()
+    again.activate()
     again.publish(topic, message)
     assert again.subscriber_count(topic) == 0
 
@@ -139,6 +217,7 @@ def test_qualities_of_service_are_those_of_nav2(lab: Lab) -> None:
         "events/wheel_drop": (10, "RELIABLE", "VOLATILE"),
         "events/bumper": (10, "RELIABLE", "VOLATILE"),
         "kidnapped": (10, "RELIABLE", "VOLATILE"),
+        "map_id": (1, "RELIABLE", "TRANSIENT_LOCAL"),
         "hypotheses": (1, "RELIABLE", "TRANSIENT_LOCAL"),
         "hypothesis_markers": (10, "RELIABLE", "VOLATILE"),
         "localized": (1, "RELIABLE", "TRANSIENT_LOCAL"),

@@ -20,10 +20,11 @@ from firstfix.ros.channels import (
     subscribed_topics,
 )
 from firstfix.ros.node import MakeNode, Node
-from firstfix.ros.node_config import Mode, NodeConfig
+from firstfix.ros.node_config import NodeConfig
 from firstfix.ros.parameters import configured, flattened
 from firstfix.ros.ros1.master import is_forgotten, register_anew, wait_for_master
-from firstfix.ros.ros1.types import Empty, decoded, make, message_class
+from firstfix.ros.ros1.types import decoded, make, message_class, service_class
+from firstfix.ros.services import Service, ros1_services
 from firstfix.ros.transport import Severity
 
 # Messages that wait for slow subscribers; after that the oldest are dropped.
@@ -35,15 +36,6 @@ _LOG = {
     Severity.INFO: rospy.loginfo,
     Severity.WARNING: rospy.logwarn,
     Severity.ERROR: rospy.logerr,
-}
-_SEARCHES = {
-    "global_localization": Channel.RESET,
-    "reinitialize_global_localization": Channel.RESET,
-}
-# A service has one provider: an AMCL that runs beside must keep its own.
-_SERVICES = {
-    Mode.BOOTSTRAP: {**_SEARCHES, "~request_nomotion_update": Channel.UPDATE},
-    Mode.FULL: {**_SEARCHES, "request_nomotion_update": Channel.UPDATE},
 }
 
 
@@ -111,13 +103,7 @@ def run(arguments: list[str], make_node: MakeNode = Node) -> None:
         threading.Thread(target=_ask_for_map, args=(node,), daemon=True).start()
     for channel, topic in topics.items():
         _subscribe(topic, partial(node.receive, channel))
-    names = _SERVICES[config.mode]
-    _spin(
-        [
-            rospy.Service(name, Empty, partial(_ask, node, channel))
-            for name, channel in names.items()
-        ]
-    )
+    _spin([_offer(node, service) for service in ros1_services(config)])
     node.stop()
 
 
@@ -177,9 +163,14 @@ def _switch(name: str, value: Any) -> bool:
     return value
 
 
-def _ask(node: Node, channel: Channel, _: Any) -> Any:
-    node.receive(channel)
-    return Empty._response_class()  # noqa: SLF001 - rospy's name for it
+def _offer(node: Node, service: Service) -> rospy.Service:
+    kind = service_class(service.type_name)
+
+    def answer(request: Any) -> Any:
+        fields = node.answer(service.request, request)
+        return kind._response_class(**fields)  # noqa: SLF001 - rospy's name for it
+
+    return rospy.Service(service.name.replace("~/", "~"), kind, answer)
 
 
 def _ask_for_map(node: Node) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import genpy
 import genpy.dynamic
+import nav_msgs.srv
 import roslib.message
 import rospy
 from rosbags.typesys import Stores, get_typestore
@@ -39,6 +40,24 @@ def message_class(type_name: str) -> Any:
     store = get_typestore(Stores.ROS1_NOETIC)
     definition, _ = store.generate_msgdef(f"{package}/msg/{name}", ros_version=1)
     return genpy.dynamic.generate_dynamic(type_name, definition)[type_name]
+
+
+def service_class(type_name: str) -> Any:
+    """Return the class of a service.
+
+    Parameters
+    ----------
+    type_name : str
+        ``nav_msgs/Type``, or ``std_srvs/Empty``, whose package need not be installed.
+
+    Returns
+    -------
+    type
+        The class.
+    """
+    if type_name == _EMPTY:
+        return Empty
+    return getattr(nav_msgs.srv, type_name.partition("/")[2])
 
 
 def make(type_name: str, /, **fields: Any) -> Any:

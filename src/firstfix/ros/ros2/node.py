@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import signal
 import traceback
@@ -17,6 +18,7 @@ from rclpy.utilities import remove_ros_args
 from firstfix.core.errors import InputError
 from firstfix.ros.node import MakeNode, Node
 from firstfix.ros.parameters import Parameter, configured, parameters
+from firstfix.ros.ros2.localized import LocalizedService
 from firstfix.ros.ros2.transport import Ros2
 from firstfix.ros.ros2.types import described
 
@@ -44,6 +46,7 @@ class Ros2Node(LifecycleNode):
         super().__init__("firstfix")
         self._make_node = make_node
         self._transport: Ros2 | None = None
+        self._localized = LocalizedService(self)
         for parameter in parameters():
             self._declare(parameter)
         for name, (default, text) in RCLPY_PARAMETERS.items():
@@ -56,7 +59,7 @@ class Ros2Node(LifecycleNode):
         try:
             self._warn_of_unknown()
             config = configured(self._values())
-            self._transport = Ros2(self, config, self._bond_timeout())
+            self._transport = Ros2(self, config, self._bond_timeout(), self._localized)
             self._transport.start(self._make_node(config, self._transport))
         except (InputError, NameValidationException) as error:
             self.end()
@@ -100,6 +103,8 @@ class Ros2Node(LifecycleNode):
         if self._transport is not None:
             self._transport.close()
         self._transport = None
+        # Reference cycles keep arrays of 10 MB, which do not trigger the collector.
+        gc.collect()
 
     def _values(self) -> dict[str, Any]:
         return {each.name: self.get_parameter(each.name).value for each in parameters()}

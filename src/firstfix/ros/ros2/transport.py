@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from functools import partial
 from typing import Any
@@ -11,9 +12,12 @@ import rclpy
 from rclpy.lifecycle import LifecycleNode
 
 from firstfix.ros.channels import (
+    AMCL_POSE,
+    LOCALIZED,
     PARTICLE_POSES,
     PARTICLES,
     Channel,
+    Delivery,
     Topic,
     published_topics,
     subscribed_topics,
@@ -21,14 +25,10 @@ from firstfix.ros.channels import (
 from firstfix.ros.node import Node
 from firstfix.ros.node_config import NodeConfig
 from firstfix.ros.ros2.bond import BOND, Bond
+from firstfix.ros.ros2.localized import LocalizedService
 from firstfix.ros.ros2.types import LATCHED, find, make, quality
+from firstfix.ros.services import LoadResult, Request, Service, ros2_services
 from firstfix.ros.transport import Severity
-
-_SERVICES = {
-    "reinitialize_global_localization": ("std_srvs/Empty", Channel.RESET),
-    "request_nomotion_update": ("std_srvs/Empty", Channel.UPDATE),
-    "set_initial_pose": ("nav2_msgs/SetInitialPose", Channel.INITIAL_POSE),
-}
 
 
 class Ros2:
@@ -42,16 +42,25 @@ class Ros2:
         The topics depend on the mode.
     bond_timeout_s : float, optional
         Silence after which the lifecycle manager treats the node as dead, s; 0: no bond.
+    localized : LocalizedService, optional
+        Answers once the robot is localized.
     """
 
     def __init__(
-        self, owner: LifecycleNode, config: NodeConfig, bond_timeout_s: float = 0.0
+        self,
+        owner: LifecycleNode,
+        config: NodeConfig,
+        bond_timeout_s: float = 0.0,
+        localized: LocalizedService | None = None,
     ) -> None:
         self._owner = owner
         self._config = config
         self._bond_timeout_s = bond_timeout_s
+        self._localized = localized
         self._node: Node | None = None
         self._is_active = False
+        self._kept: dict[Topic, Any] = {}
+        self._sending = threading.Lock()
         self.particles = PARTICLES if find("msg", PARTICLES.type_name) else PARTICLE_POSES
         kinds = {t: find("msg", t.type_name) for t in published_topics(config, self.particles)}
         self._publishers = {
@@ -79,14 +88,18 @@ class Ros2:
                 receive = partial(self._receive, node, channel, topic)
                 made = self._owner.create_subscription(kind, topic.name, receive, quality(topic))
                 self._subscriptions.append(made)
-        for name, (type_name, channel) in _SERVICES.items():
-            if (kind := self._find("srv", type_name, name)) is not None:
-                answer = partial(self._answer, node, channel, name)
-                self._services.append(self._owner.create_service(kind, name, answer))
+        for service in ros2_services(self._config):
+            if (kind := self._find("srv", service.type_name, service.name)) is not None:
+                answer = partial(self._answer, node, service)
+                self._services.append(self._owner.create_service(kind, service.name, answer))
 
     def activate(self) -> None:
         """Pass messages on to the node."""
-        self._is_active = True
+        with self._sending:
+            self._is_active = True
+            kept, self._kept = self._kept, {}
+            for topic, message in kept.items():
+                self._send(topic, message)
         if self._node is not None:
             self._node.expects_topics_since = time.monotonic()
         if self._bond_timeout_s > 0.0 and (kind := self._find("msg", BOND, "bond")) is not None:
@@ -104,6 +117,7 @@ class Ros2:
     def close(self) -> None:
         """Stop the node, and destroy its topics and services."""
         self.deactivate()
+        self._set_localized(is_localized=False)
         if self._node is not None:
             self._node.stop()
         self._node = None  # or node and transport would keep each other alive
@@ -120,7 +134,16 @@ class Ros2:
         return make(type_name, **fields)
 
     def publish(self, topic: Topic, message: Any) -> None:
-        """Send a message; while the node is not active, rclpy drops it."""
+        """Send a message; while the node is not active, only the last latched one is kept."""
+        if topic == LOCALIZED:
+            self._set_localized(is_localized=message.data)
+        with self._sending:
+            if self._is_active:
+                self._send(topic, message)
+            elif topic.delivery is Delivery.LATCHED and topic != AMCL_POSE:
+                self._kept[topic] = message  # rclpy would drop it; a pose would be out of date
+
+    def _send(self, topic: Topic, message: Any) -> None:
         if (publisher := self._publishers.get(topic.name)) is None:
             return  # closed while the worker was busy
         try:
@@ -155,9 +178,19 @@ class Ros2:
         if self._is_active or topic.delivery in LATCHED:
             node.receive(channel, message)
 
-    def _answer(self, node: Node, channel: Channel, name: str, request: Any, response: Any) -> Any:
-        if self._is_active:
-            node.receive(channel, getattr(request, "pose", None))
+    def _set_localized(self, *, is_localized: bool) -> None:
+        if self._localized is not None:
+            self._localized.update(is_localized=is_localized)
+
+    def _answer(self, node: Node, service: Service, request: Any, response: Any) -> Any:
+        if not self._is_active:
+            self.log(Severity.WARNING, f"{service.name} has no effect: firstfix is not active")
+            fields = {"result": int(LoadResult.UNDEFINED_FAILURE)}
+            fields = fields if service.request is Request.LOAD_MAP else {}
         else:
-            self.log(Severity.WARNING, f"{name} has no effect: firstfix is not active")
+            if service.request is Request.SEARCH:
+                self._set_localized(is_localized=False)  # at once, not after the search began
+            fields = node.answer(service.request, request)
+        for name, value in fields.items():
+            setattr(response, name, value)
         return response

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -87,17 +88,17 @@ class World:
         """Return a publisher of a test."""
         return self.join(End(kind, topic, quality))
 
-    def subscribe(self, kind: Any, topic: str, quality: QoSProfile) -> list[Any]:
-        """Return a list that grows with what the node publishes."""
-        received: list[Any] = []
-        self.join(End(kind, topic, quality, received.append))
-        return received
+    def listen(
+        self, kind: Any, topic: str, quality: QoSProfile, receive: Callable[[Any], None]
+    ) -> None:
+        """Call a function with what the node publishes."""
+        self.join(End(kind, topic, quality, receive))
 
     def ask(self, service: str, request: Any = None) -> Any:
-        """Call a service."""
+        """Call a service; return its response, or the coroutine that will return it."""
         kind, callback = self.services[service]
         response = callback(request or kind.Request(), kind.Response())
-        assert isinstance(response, kind.Response)
+        assert inspect.iscoroutine(response) or isinstance(response, kind.Response)
         return response
 
     def lines(self, severity: str) -> list[str]:
