@@ -14,6 +14,7 @@ PACKAGES = (
     "lab",
     "web",
     "ros",
+    "vda5050",
     "localizer",
     "io",
     "plots",

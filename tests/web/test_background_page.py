@@ -61,7 +61,7 @@ def test_a_node_is_shown_and_controlled(ways, recorder: Recorder):
 def test_commands_before_the_node_is_configured_are_refused(ways):
     page, _ = ways
     with pytest.raises(InputError, match="configure"):
-        page._give(NewMap(0.0, HOUSE))
+        page.give(NewMap(0.0, HOUSE))
 
 
 def test_it_ends_with_its_context(recorder: Recorder):

@@ -11,12 +11,24 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from firstfix.cli.fleet_options import (
+    FleetMaps,
+    FleetUrl,
+    FleetVersion,
+    FleetVersionOption,
+    Manufacturer,
+    MapId,
+    SerialNumber,
+    fleet_bridge,
+)
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
     from firstfix.ros.names import Names
     from firstfix.ros.node import MakeNode
     from firstfix.ros.node_config import NodeConfig
+    from firstfix.ros.transport import Transport
+    from firstfix.vda5050.bridge import Bridge
 
 # What each node needs, and how to come by it.
 _VENV = "run firstfix in an environment made by `/usr/bin/python3 -m venv --system-site-packages`"
@@ -41,21 +53,45 @@ PASSED_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
 AFTER_DASHES = {"allow_extra_args": True}
 
 
-def ros1(context: typer.Context) -> None:
+def ros1(
+    context: typer.Context,
+    vda5050: FleetUrl = None,
+    manufacturer: Manufacturer = None,
+    serial_number: SerialNumber = None,
+    map_id: MapId = None,
+    vda5050_map: FleetMaps = None,
+    vda5050_version: FleetVersionOption = FleetVersion.V2,
+) -> None:
     """Run the node for ROS 1: it finds the robot, and starts AMCL or tracks the robot itself.
 
     Arguments are those of rosrun: `scan:=base_scan _mode:=full _base_frame_id:=base_link`.
     """
-    _load("ros1").run(context.args)
+    adapter = _load("ros1")
+    with fleet_bridge(
+        vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version
+    ) as bridge:
+        adapter.run(context.args, _maker(bridge))
 
 
-def ros2(context: typer.Context) -> None:
+def ros2(
+    context: typer.Context,
+    vda5050: FleetUrl = None,
+    manufacturer: Manufacturer = None,
+    serial_number: SerialNumber = None,
+    map_id: MapId = None,
+    vda5050_map: FleetMaps = None,
+    vda5050_version: FleetVersionOption = FleetVersion.V2,
+) -> None:
     """Run the node for ROS 2, a lifecycle node: configure and activate it, or let it do so itself.
 
     Arguments are those of `ros2 run`: `--ros-args -r scan:=base_scan -p mode:=full
     -p autostart:=true`.
     """
-    _load("ros2").run(context.args)
+    adapter = _load("ros2")
+    with fleet_bridge(
+        vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version
+    ) as bridge:
+        adapter.run(context.args, _maker(bridge))
 
 
 def dds(
@@ -84,6 +120,12 @@ def dds(
     ros_args: Annotated[  # noqa: ARG001 - ROS writes it before its arguments
         bool, typer.Option("--ros-args", help="As ROS 2 has it; without effect.")
     ] = False,
+    vda5050: FleetUrl = None,
+    manufacturer: Manufacturer = None,
+    serial_number: SerialNumber = None,
+    map_id: MapId = None,
+    vda5050_map: FleetMaps = None,
+    vda5050_version: FleetVersionOption = FleetVersion.V2,
 ) -> None:
     """Run the node for ROS 2 where no ROS is installed, as a participant of DDS.
 
@@ -103,7 +145,10 @@ def dds(
         assignments=param or [],
         options=options,
     )
-    adapter.run(config, names)
+    with fleet_bridge(
+        vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version
+    ) as bridge:
+        adapter.run(config, names, _maker(bridge))
 
 
 def runner(robot: str) -> Callable[[str, list[str], MakeNode], None]:
@@ -151,6 +196,19 @@ def _settings_of(arguments: list[str], map_file: str) -> tuple[NodeConfig, Names
         options={"yaml_filename": map_file},
     )
     return config, names
+
+
+def _maker(bridge: Bridge | None) -> MakeNode:
+    """Return a factory of nodes that the bridge, if there is one, watches."""
+    from firstfix.ros.node import Node
+
+    def make(config: NodeConfig, transport: Transport) -> Node:
+        node = Node(config, transport, [] if bridge is None else [bridge])
+        if bridge is not None:
+            bridge.attach(node.give)
+        return node
+
+    return make
 
 
 def _load(name: str) -> ModuleType:

@@ -12,12 +12,23 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from firstfix.cli.fleet_options import (
+    FleetMaps,
+    FleetUrl,
+    FleetVersion,
+    FleetVersionOption,
+    Manufacturer,
+    MapId,
+    SerialNumber,
+    fleet_bridge,
+)
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
     import socket
 
     from firstfix.core.grid import OccupancyGrid
+    from firstfix.vda5050.bridge import Bridge
     from firstfix.web.access_control import AccessPolicy
 
 PORT = 8642
@@ -105,6 +116,12 @@ def serve(
         bool, typer.Option("--read-only", help="Viewers can watch and ask, but not steer.")
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Of the simulated robot.")] = 1,
+    vda5050: FleetUrl = None,
+    manufacturer: Manufacturer = None,
+    serial_number: SerialNumber = None,
+    map_id: MapId = None,
+    vda5050_map: FleetMaps = None,
+    vda5050_version: FleetVersionOption = FleetVersion.V2,
 ) -> None:
     """Show the state of a robot on a live page, and answer requests for its pose.
 
@@ -112,22 +129,31 @@ def serve(
     ros1 -- scan:=base_scan`.
     """
     address = Address(host, port, token, may_steer=not read_only)
-    if robot is not Transport.SIM:
-        serve_robot(robot.value, Path(map_), context.args, address)
-        return
-    if context.args:
+    if context.args and robot is Transport.SIM:
         raise InputError(
             expected="a map, and options",
             received=f"also {context.args[0]}",
             remedy="arguments of ROS go with --robot ros1, ros2 or dds",
         )
-    from firstfix.lab.worlds.catalog import world_or_map
+    with fleet_bridge(
+        vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version
+    ) as bridge:
+        if robot is Transport.SIM:
+            from firstfix.lab.worlds.catalog import world_or_map
 
-    serve_simulated(world_or_map(map_), Path(map_).stem, seed, address, Rest.AWAKE)
+            grid, name = world_or_map(map_), Path(map_).stem
+            serve_simulated(grid, name, seed, address, Rest.AWAKE, bridge)
+        else:
+            serve_robot(robot.value, Path(map_), context.args, address, bridge)
 
 
 def serve_simulated(
-    grid: OccupancyGrid, name: str, seed: int, address: Address, rest: Rest
+    grid: OccupancyGrid,
+    name: str,
+    seed: int,
+    address: Address,
+    rest: Rest,
+    bridge: Bridge | None = None,
 ) -> None:
     """Serve the page of a simulated robot in a building called ``name`` until it is interrupted.
 
@@ -156,7 +182,9 @@ def serve_simulated(
         robot = SimulatedRobot(grid, seed, name)
         if rest is Rest.SLEEPS:
             robot.pause()
-        node = SimulatedNode(robot, store, warn)
+        node = SimulatedNode(robot, store, warn, [] if bridge is None else [bridge])
+        if bridge is not None:
+            bridge.attach(node.give)
         executor = CommandExecutor(store, node.give, robot)
         page = Page("sim", store, executor, access, on_first_viewer=robot.resume)
         node.start()
@@ -166,7 +194,13 @@ def serve_simulated(
         node.stop()
 
 
-def serve_robot(robot: str, map_path: Path, arguments: list[str], address: Address) -> None:
+def serve_robot(
+    robot: str,
+    map_path: Path,
+    arguments: list[str],
+    address: Address,
+    bridge: Bridge | None = None,
+) -> None:
     """Run the node of a robot (ros1, ros2, dds) with arguments of ROS, and serve its page.
 
     Raises
@@ -184,7 +218,10 @@ def serve_robot(robot: str, map_path: Path, arguments: list[str], address: Addre
     check_searchable(load_map(map_path))
     with listen(address.host, address.port) as listening:
         _announce(listening, access)
-        with BackgroundPage(robot, map_path.stem, access, listening) as page:
+        watchers = [] if bridge is None else [bridge]
+        with BackgroundPage(robot, map_path.stem, access, listening, watchers) as page:
+            if bridge is not None:
+                bridge.attach(page.give)
             run(f"{map_path.resolve()}", arguments, page.make_node)
 
 

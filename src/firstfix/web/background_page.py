@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from socket import socket
 
 from firstfix.core.errors import InputError
 from firstfix.localizer.inputs import Input
-from firstfix.ros.node import Node
+from firstfix.ros.node import Node, Watcher
 from firstfix.ros.node_config import NodeConfig
 from firstfix.ros.transport import Transport
 from firstfix.web.access_control import AccessPolicy
@@ -32,13 +33,23 @@ class BackgroundPage:
         Who may see the page, and who may steer.
     listening : socket
         The open port.
+    watchers : sequence of Watcher
+        Others that watch the node.
     """
 
-    def __init__(self, robot: str, map_name: str, access: AccessPolicy, listening: socket) -> None:
+    def __init__(
+        self,
+        robot: str,
+        map_name: str,
+        access: AccessPolicy,
+        listening: socket,
+        watchers: Sequence[Watcher] = (),
+    ) -> None:
         self._store = SnapshotStore(map_name)
+        self._watchers = watchers
         self._node: Node | None = None
         self._server = make_server(
-            Page(robot, self._store, CommandExecutor(self._store, self._give), access)
+            Page(robot, self._store, CommandExecutor(self._store, self.give), access)
         )
         serve = {"sockets": [listening]}
         self._thread = threading.Thread(
@@ -68,10 +79,17 @@ class BackgroundPage:
         Node
             Not started yet.
         """
-        self._node = Node(config, transport, [self._store])
+        self._node = Node(config, transport, [self._store, *self._watchers])
         return self._node
 
-    def _give(self, given: Input) -> None:
+    def give(self, given: Input) -> None:
+        """Queue an input for the node.
+
+        Raises
+        ------
+        InputError
+            If there is no node yet.
+        """
         if self._node is None:
             raise InputError(
                 "The node is not configured yet. Configure it: "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from firstfix.core.errors import InputError
 from firstfix.fields.cache import cache_folder
@@ -15,6 +15,7 @@ from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.precompile import precompile
 from firstfix.ros.inbox import Inbox
+from firstfix.ros.node import Watcher
 from firstfix.web.snapshot_store import SnapshotStore
 
 # Longest wait for the present step at the end.
@@ -35,14 +36,21 @@ class SimulatedNode:
         Receives inputs, outputs and the true pose, in the thread of the node.
     warn : callable
         Receives what went wrong, as text.
+    watchers : sequence of Watcher
+        Others that watch the localizer.
     """
 
     def __init__(
-        self, robot: SimulatedRobot, store: SnapshotStore, warn: Callable[[str], None]
+        self,
+        robot: SimulatedRobot,
+        store: SnapshotStore,
+        warn: Callable[[str], None],
+        watchers: Sequence[Watcher] = (),
     ) -> None:
         self._robot = robot
         self._store = store
         self._warn = warn
+        self._watchers: tuple[Watcher, ...] = (store, *watchers)
         self._inbox: Inbox[Input] = Inbox()
         self._starts = robot.starts
         self._localizer = Localizer(cache_dir=cache_folder())
@@ -91,7 +99,8 @@ class SimulatedNode:
 
     def _handle(self, given: Input) -> None:
         outputs = self._localizer.handle(given)
-        self._store(given, outputs, self._localizer)
+        for watch in self._watchers:
+            watch(given, outputs, self._localizer)
 
     def _try(self, step: Callable[..., None], *given: Input) -> None:
         try:
