@@ -1,9 +1,12 @@
 """A cached array is the built one, whatever happens to its file."""
 
+import io
+import mmap
 import os
 import subprocess
 import sys
 import tempfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays, scalar_dtypes
 
 from firstfix.fields import cache
-from firstfix.fields.cache import cache_folder, content_key, load_or_build
+from firstfix.fields.cache import cache_folder, content_key, load_or_build, remove_unused
 
 plain = scalar_dtypes().filter(lambda dtype: dtype.kind in "biufc")
 any_array = plain.flatmap(lambda dtype: arrays(dtype, array_shapes(min_dims=0, min_side=0)))
@@ -55,6 +58,13 @@ def test_the_loaded_array_is_the_built_one(tmp_path_factory, array):
     assert_loaded(builder, folder)
     assert_loaded(builder, folder)
     assert builder.calls == 1
+
+
+def test_an_array_is_mapped_and_numpy_can_read_its_file(tmp_path):
+    for _ in range(2):
+        array = load_or_build("key", Builder(), tmp_path)
+        assert isinstance(array.base, mmap.mmap)
+    assert np.array_equal(np.load(only_file(tmp_path), mmap_mode="r"), GRID)
 
 
 @pytest.mark.parametrize("array", [GRID[:, ::3], GRID.T, np.asfortranarray(GRID)])
@@ -100,8 +110,11 @@ def test_a_truncated_file_is_built_again(tmp_path):
 
 def test_pickles_are_never_loaded(tmp_path):
     for strange in (np.array([{}]), np.array(["text"])):
-        np.savez(tmp_path / "a.npz", array=strange)
-        (tmp_path / "a.npz").replace(tmp_path / "key.fields")
+        file = io.BytesIO()
+        np.save(file, strange, allow_pickle=True)
+        content = file.getvalue()
+        crc = zlib.crc32(content).to_bytes(4, "little")
+        (tmp_path / "key.fields").write_bytes(content + crc)
         builder = Builder()
         assert_loaded(builder, tmp_path)
         assert builder.calls == 1
@@ -113,7 +126,7 @@ def _full(*args, **kwargs):
 
 @pytest.mark.parametrize(
     ("owner", "function"),
-    [(Path, "mkdir"), (tempfile, "mkstemp"), (Path, "replace"), (np, "savez")],
+    [(Path, "mkdir"), (tempfile, "mkstemp"), (Path, "replace"), (cache, "_write")],
 )
 def test_a_full_disk_costs_only_time(tmp_path, monkeypatch, owner, function):
     monkeypatch.setattr(owner, function, _full)
@@ -190,18 +203,28 @@ def test_a_key_cannot_leave_the_folder(tmp_path, key):
         load_or_build(key, Builder(), tmp_path)
 
 
-def test_the_least_recently_used_file_is_removed_first(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "MAX_TOTAL_BYTES", 4500)
+def test_the_least_recently_used_file_is_removed_first(tmp_path):
     kilobyte = Builder(np.zeros(1000, np.uint8))
     for age, key in enumerate(["c", "b", "a"]):
-        load_or_build(key, kilobyte, tmp_path)
+        load_or_build(key, kilobyte, tmp_path, 4500)
         os.utime(tmp_path / f"{key}.fields", (age + 1, age + 1))
     (tmp_path / "scans.npz").write_bytes(bytes(9999))  # of the user
-    load_or_build("c", kilobyte, tmp_path)  # the oldest, used again
-    load_or_build("d", kilobyte, tmp_path)
+    load_or_build("c", kilobyte, tmp_path, 4500)  # the oldest, used again
+    load_or_build("d", kilobyte, tmp_path, 4500)
     assert {path.stem for path in tmp_path.iterdir()} == {"a", "c", "d", "scans"}
-    load_or_build("large", Builder(np.zeros(9999, np.uint8)), tmp_path)
+    load_or_build("large", Builder(np.zeros(9999, np.uint8)), tmp_path, 4500)
     assert {path.stem for path in tmp_path.iterdir()} == {"a", "c", "d", "scans"}
+
+
+def test_a_folder_without_limit_keeps_all_that_is_used(tmp_path):
+    for key in "abc":
+        load_or_build(key, Builder(), tmp_path, None)
+    os.utime(tmp_path / "a.fields", (1, 1))
+    os.utime(tmp_path / "b.fields", (1, 1))
+    load_or_build("b", Builder(), tmp_path, None)  # used again
+    remove_unused(tmp_path, days=30.0)
+    remove_unused(tmp_path / "nowhere", days=30.0)
+    assert {path.stem for path in tmp_path.iterdir()} == {"b", "c"}
 
 
 HAMMER = """

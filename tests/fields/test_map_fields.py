@@ -75,21 +75,31 @@ def test_another_map_has_its_own_cache(grid, tmp_path):
 
 
 def test_where_the_map_lies_does_not_matter_to_the_cache(grid, tmp_path):
-    _ = MapFields(grid, tmp_path).ranges
+    names = ("squares", "clearance", "positions", "endpoints", "ranges")
+    MapFields(grid, tmp_path).compute(*names)
     files = list(tmp_path.iterdir())
-    assert len(files) == 1
-    _ = MapFields(OccupancyGrid(grid.cells, grid.resolution, SE2(5.0, -3.0, 1.0)), tmp_path).ranges
+    assert len(files) == len(names)
+    moved = OccupancyGrid(grid.cells, grid.resolution, SE2(5.0, -3.0, 1.0))
+    MapFields(moved, tmp_path).compute(*names)
     assert list(tmp_path.iterdir()) == files
 
 
 def test_a_damaged_cache_is_built_again(grid, tmp_path):
-    fresh = MapFields(grid, tmp_path)
-    _ = fresh.ranges
-    (file,) = tmp_path.iterdir()
-    content = bytearray(file.read_bytes())
-    content[len(content) // 2] ^= 0xFF
-    file.write_bytes(content)
+    fresh = MapFields(grid)
     assert_equal(fresh, MapFields(grid, tmp_path))
+    for file in tmp_path.iterdir():
+        content = bytearray(file.read_bytes())
+        content[len(content) // 2] ^= 0xFF
+        file.write_bytes(content)
+    assert_equal(fresh, MapFields(grid, tmp_path))
+
+
+def test_the_size_counts_what_has_been_computed(grid):
+    fields = MapFields(grid)
+    before = fields.nbytes
+    assert before >= grid.cells.nbytes
+    _ = fields.ranges
+    assert fields.nbytes >= before + fields.ranges.nbytes
 
 
 def test_a_field_that_is_not_read_is_not_computed(grid, monkeypatch):

@@ -94,3 +94,34 @@ def test_a_map_that_is_not_in_the_site(site: Site) -> None:
         site.locate(scan, prior={"attic": None})
     with pytest.raises(InputError, match="no map 'attic'"):
         site.first_look(site.query(scan), ["attic"])
+
+
+def test_prepared_maps_are_read_from_files_within_the_limit(folder: Path, tmp_path: Path) -> None:
+    Site.load(folder, tmp_path).prepare()
+    files = {file: file.stat().st_ino for file in tmp_path.iterdir()}
+    small = Site.load(folder, tmp_path, memory_limit=1)
+    result = small.locate(scan_in("second", POSE))
+    assert (result.verdict, result.map_id) == (Verdict.UNIQUE, "second")
+    assert {file: file.stat().st_ino for file in tmp_path.iterdir()} == files
+    one = small.fields("first")
+    assert small.fields("first") is one
+    _ = small.fields("second")
+    assert small.fields("first") is not one
+
+
+def test_only_an_edited_map_is_prepared_again(tmp_path: Path) -> None:
+    save_rooms(tmp_path / "maps")
+    Site.load(tmp_path / "maps", tmp_path / "cache").prepare()
+    before = set((tmp_path / "cache").iterdir())
+    save_map(draw(ROOMS["second"][1:]), tmp_path / "maps" / "first" / "map.yaml")
+    site = Site.load(tmp_path / "maps", tmp_path / "cache")
+    site.prepare()
+    assert len(set((tmp_path / "cache").iterdir()) - before) == len(before) / len(site.map_ids)
+
+
+def test_a_damaged_file_is_built_again(folder: Path, tmp_path: Path) -> None:
+    Site.load(folder, tmp_path).prepare()
+    for file in tmp_path.iterdir():
+        file.write_bytes(file.read_bytes()[:-9])
+    result = Site.load(folder, tmp_path).locate(scan_in("first", POSE))
+    assert (result.verdict, result.map_id) == (Verdict.UNIQUE, "first")

@@ -75,7 +75,7 @@ def _load(path: Path) -> Site:
     from firstfix.fields.cache import cache_folder
     from firstfix.site.site import Site
 
-    return Site.load(path, cache_folder())
+    return Site.load(path, cache_folder() / "sites")
 
 
 def _prepare(site: Site) -> None:

@@ -1,27 +1,34 @@
 """Arrays that are expensive to build, kept on disk between runs.
 
 The cache never changes a result: a file that cannot be read is built again, and a failed write is
-ignored. One file in the format .npz holds the array of one key; its CRC-32 detects damage.
+ignored. One file in the format .npy holds the array of one key, followed by the CRC-32 of all that,
+which detects damage. Arrays are mapped into memory: processes share them, and the system can drop
+what is not in use.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import io
+import mmap
 import os
 import tempfile
+import time
+import zlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 MAX_TOTAL_BYTES = 2 << 30
-"""Size of a cache folder above which the least recently used files are removed."""
+"""Default size of a cache folder above which the least recently used files are removed."""
 
 _SUFFIX, _TEMPORARY = ".fields", ".partial"
 _PLAIN_KINDS = "biufc"  # never objects, which are pickles
+_CRC_BYTES = 4
 
 
 def cache_folder() -> Path:
@@ -61,7 +68,12 @@ def content_key(*parts: bytes | str | NDArray[Any]) -> str:
     return digest.hexdigest()
 
 
-def load_or_build(key: str, build: Callable[[], NDArray[Any]], folder: Path) -> NDArray[Any]:
+def load_or_build(
+    key: str,
+    build: Callable[[], NDArray[Any]],
+    folder: Path,
+    limit: int | None = MAX_TOTAL_BYTES,
+) -> NDArray[Any]:
     """Load an array from the cache, or build and store it.
 
     Processes may share a folder: files are replaced atomically.
@@ -74,6 +86,9 @@ def load_or_build(key: str, build: Callable[[], NDArray[Any]], folder: Path) -> 
         Builds the array; called only if there is no valid file for this key.
     folder : Path
         The cache, such as `cache_folder`; created if missing.
+    limit : int or None
+        Size of the folder above which the least recently used files are removed, bytes; None for
+        a folder without limit.
 
     Returns
     -------
@@ -88,16 +103,18 @@ def load_or_build(key: str, build: Callable[[], NDArray[Any]], folder: Path) -> 
         array = build().view()
         _check_plain(array)
         with contextlib.suppress(OSError):  # a full or read-only disk
-            _store(path, array)
+            _store(path, array, limit)
+            stored = _load(path)
+            array = array if stored is None else stored
     array.flags.writeable = False
     return array
 
 
 def _load(path: Path) -> NDArray[Any] | None:
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            array: NDArray[Any] = archive["array"]
-            _check_plain(array)
+        with path.open("rb") as file:
+            content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        array = _array_in(content)
     except Exception:  # noqa: BLE001 - a damaged file raises nearly anything
         return None
     with contextlib.suppress(OSError):
@@ -105,28 +122,66 @@ def _load(path: Path) -> NDArray[Any] | None:
     return array
 
 
-def _store(path: Path, array: NDArray[Any]) -> None:
-    if array.nbytes > MAX_TOTAL_BYTES:
+def _array_in(content: mmap.mmap) -> NDArray[Any]:
+    """Return the array in a file; raises nearly anything if it is damaged."""
+    end = len(content) - _CRC_BYTES
+    with memoryview(content) as whole, whole[:end] as sealed:
+        if zlib.crc32(sealed) != int.from_bytes(content[end:], "little"):
+            raise ValueError("damaged")
+    version = np.lib.format.read_magic(content)
+    if version != (1, 0):
+        raise ValueError("another version of .npy")
+    shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(content)
+    array = np.ndarray(shape, dtype, content, content.tell(), order="F" if is_fortran else "C")
+    _check_plain(array)
+    return array
+
+
+def _store(path: Path, array: NDArray[Any], limit: int | None) -> None:
+    if limit is not None and array.nbytes > limit:
         return
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor, temporary = tempfile.mkstemp(dir=path.parent, suffix=_TEMPORARY)
     try:
         with os.fdopen(descriptor, "wb") as file:
-            np.savez(file, array=array)
+            _write(file, np.asarray(array, order="C"))
         Path(temporary).replace(path)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
-    _remove_least_used(path)
+    if limit is not None:
+        _remove_least_used(path, limit)
 
 
-def _remove_least_used(newest: Path) -> None:
-    """Remove files until the rest fits, also those of processes that were killed."""
-    files = [*newest.parent.glob(f"*{_SUFFIX}"), *newest.parent.glob(f"*{_TEMPORARY}")]
-    used = {file: file.stat() for file in files}
+def _write(file: BinaryIO, array: NDArray[Any]) -> None:
+    start = io.BytesIO()
+    np.lib.format.write_array_header_1_0(start, np.lib.format.header_data_from_array_1_0(array))
+    data = array.reshape(-1).view(np.uint8).data
+    file.writelines((start.getbuffer(), data))
+    crc = zlib.crc32(data, zlib.crc32(start.getbuffer()))
+    file.write(crc.to_bytes(_CRC_BYTES, "little"))
+
+
+def remove_unused(folder: Path, days: float) -> None:
+    """Remove the files of a cache that have not been read for some days."""
+    oldest = time.time() - days * 86400.0
+    with contextlib.suppress(OSError):
+        for file in _files(folder):
+            if file.stat().st_mtime < oldest:
+                file.unlink(missing_ok=True)
+
+
+def _files(folder: Path) -> list[Path]:
+    """Return the files of a cache, also those of processes that were killed."""
+    return [*folder.glob(f"*{_SUFFIX}"), *folder.glob(f"*{_TEMPORARY}")]
+
+
+def _remove_least_used(newest: Path, limit: int) -> None:
+    """Remove files until the rest fits."""
+    used = {file: file.stat() for file in _files(newest.parent)}
     total = sum(status.st_size for status in used.values())
     for file in sorted(used, key=lambda file: (file == newest, used[file].st_mtime_ns)):
-        if total <= MAX_TOTAL_BYTES:
+        if total <= limit:
             return
         file.unlink(missing_ok=True)
         total -= used[file].st_size

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -28,6 +29,10 @@ from firstfix.fields.search_grid import (
 # Farther than any refinement reaches for a wall.
 NEAR_M = 1.0
 
+# Of the arrays in the folder of fields.
+_VERSION = "fields 1"
+_SETTINGS = repr((SPACING_M, MAX_POSITIONS, DIRECTIONS, UNIT_M, REACH_M, NEAR_M, MAX_LIMIT))
+
 
 @dataclass(frozen=True, eq=False)
 class MapFields:
@@ -40,11 +45,18 @@ class MapFields:
     grid : OccupancyGrid
         The map itself.
     cache_dir : Path or None
-        Folder of range tables from earlier runs; None computes in memory.
+        Folder of fields from earlier runs; None computes in memory.
+    key : str
+        Name of the map's content in that folder; by default a hash of its cells.
+    cache_limit : int or None
+        Size of the folder above which the least recently used files are removed, bytes; None for
+        no limit.
     """
 
     grid: OccupancyGrid
     cache_dir: Path | None = None
+    key: str = ""
+    cache_limit: int | None = cache.MAX_TOTAL_BYTES
 
     def compute(self, *names: str) -> None:
         """Compute these fields now, so that no scan waits for them."""
@@ -62,7 +74,7 @@ class MapFields:
 
         Shape (height, width).
         """
-        return _read_only(truncated_squares(self.grid.occupied, self.near))
+        return self._kept("squares", lambda: truncated_squares(self.grid.occupied, self.near))
 
     @cached_property
     def distances(self) -> NDArray[np.float32]:
@@ -72,7 +84,7 @@ class MapFields:
     @cached_property
     def clearance(self) -> NDArray[np.uint8]:
         """Chessboard distance to the nearest wall, cells, by which rays leap; (height, width)."""
-        return _read_only(chessboard_clearance(self.grid.occupied))
+        return self._kept("clearance", lambda: chessboard_clearance(self.grid.occupied))
 
     @cached_property
     def pointscore(self) -> NDArray[np.uint16]:
@@ -82,28 +94,44 @@ class MapFields:
     @cached_property
     def positions(self) -> SearchGrid:
         """The positions of the search."""
-        return build_search_grid(self.grid)
+        return SearchGrid.unpacked(
+            self._kept("positions", lambda: build_search_grid(self.grid).packed())
+        )
 
     @cached_property
     def endpoints(self) -> PhasedField:
         """Truncated distances, by phases."""
-        field = build_endpoint_field(
-            self.squares, self.grid.resolution, self.positions.stride, REACH_M
-        )
-        _read_only(field.values)
-        return field
+        return PhasedField.unpacked(self._kept("endpoints", self._build_endpoints))
 
     @cached_property
     def ranges(self) -> NDArray[np.uint8]:
         """Expected ranges at the positions, shape (n_positions, 2 * DIRECTIONS)."""
-        # The only field that takes longer to build than to read from disk.
-        if self.cache_dir is None:
-            return _read_only(self._build_ranges())
-        settings = repr(
-            (self.grid.resolution, SPACING_M, MAX_POSITIONS, DIRECTIONS, UNIT_M, REACH_M)
+        return self._kept("ranges", self._build_ranges)
+
+    @cached_property
+    def _content(self) -> str:
+        return self.key or cache.content_key(
+            self.grid.occupied, self.grid.seen_free, repr(self.grid.resolution)
         )
-        key = cache.content_key("range table 1", self.grid.occupied, self.grid.seen_free, settings)
-        return _read_only(cache.load_or_build(key, self._build_ranges, self.cache_dir))
+
+    def _kept(self, name: str, build: Callable[[], NDArray[Any]]) -> NDArray[Any]:
+        """Return an array from the folder of fields, or build it; read-only."""
+        if self.cache_dir is None:
+            return _read_only(build())
+        key = cache.content_key(_VERSION, self._content, name, _SETTINGS)
+        return _read_only(cache.load_or_build(key, build, self.cache_dir, self.cache_limit))
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the map and of the fields that have been computed, bytes."""
+        held = [*vars(self).values(), *vars(self.grid).values()]
+        arrays = [getattr(value, "values", value) for value in held]
+        return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
+
+    def _build_endpoints(self) -> NDArray[np.uint8]:
+        return build_endpoint_field(
+            self.squares, self.grid.resolution, self.positions.stride, REACH_M
+        ).packed()
 
     def _build_ranges(self) -> NDArray[np.uint8]:
         return build_range_table(self.clearance, self.grid.resolution, self.positions)

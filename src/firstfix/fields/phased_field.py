@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 _SLACK_ROWS = 17
 _SLACK = 64
 
+# Bytes of the numbers before the values in a packed field: values stay aligned.
+_HEAD_BYTES = 64
+
 
 @dataclass(frozen=True, eq=False)
 class PhasedField:
@@ -61,6 +64,18 @@ class PhasedField:
         column = np.floor(dx / self.side).astype(np.int64)
         phase = (row % self.phases) * self.phases + column % self.phases
         return (phase * self.rows + row // self.phases) * self.columns + column // self.phases
+
+    def packed(self) -> NDArray[np.uint8]:
+        """Return all of it as one array of bytes, for a file; the values are bytes."""
+        numbers = [self.side, self.phases, self.rows, self.columns, self.margin]
+        head = np.zeros(_HEAD_BYTES, np.uint8)
+        head.view(np.int64)[: len(numbers)] = numbers
+        return np.concatenate([head, self.values])
+
+    @classmethod
+    def unpacked(cls, packed: NDArray[np.uint8]) -> PhasedField:
+        """Return the field of an array that `packed` made."""
+        return cls(packed[_HEAD_BYTES:], *packed[:_HEAD_BYTES].view(np.int64)[:5].tolist())
 
     def base(self, row: NDArray[np.int32], column: NDArray[np.int32]) -> NDArray[np.int64]:
         """Index into ``values`` of the first cell of blocks (row, column)."""

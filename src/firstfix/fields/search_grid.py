@@ -57,6 +57,22 @@ class SearchGrid:
         """Row and column of every position in its tile, each of shape (n,)."""
         return self.rows % np.int32(TILE_ROWS), self.columns % np.int32(TILE_COLUMNS)
 
+    def packed(self) -> NDArray[np.int32]:
+        """Return all of it as one array, for a file."""
+        parts = (self.rows, self.columns, self.tile_rows, self.tile_columns, self.tile_starts)
+        head = np.array([self.stride, len(self.rows), len(self.tile_rows)], np.int32)
+        return np.concatenate([head, *(part.astype(np.int32) for part in parts)])
+
+    @classmethod
+    def unpacked(cls, packed: NDArray[np.int32]) -> SearchGrid:
+        """Return the positions of an array that `packed` made."""
+        stride, n, tiles = packed[:3].tolist()
+        rows, columns, tile_rows, tile_columns, tile_starts = np.split(
+            packed[3:], np.cumsum([n, n, tiles, tiles])
+        )
+        starts = tile_starts.astype(np.int64)
+        return cls(stride, rows, columns, tile_rows, tile_columns, starts)
+
     @property
     def offset(self) -> float:
         """Place of a position in its block, cells: the middle of the block's central cell."""

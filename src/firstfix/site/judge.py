@@ -43,7 +43,7 @@ def judge_site(
     seen = Looked.joined(looked)
     ranked = sorted(
         (place for part in found for place in part.places),
-        key=lambda place: (-place.log_likelihood, place.map_id),
+        key=lambda place: (-place.log_posterior, place.map_id),
     )
     places, others = _without_copies(ranked)
     if not places:
@@ -75,7 +75,7 @@ def judge_site(
 
 def _shares(places: Sequence[SitePlace]) -> NDArray[np.float64]:
     """Return the probability of each place against all others and a wrong map."""
-    logs = np.array([0.0, *(place.log_likelihood for place in places)])
+    logs = np.array([0.0, *(place.log_posterior for place in places)])
     likelihoods = np.exp(logs - logs.max())
     shares: NDArray[np.float64] = likelihoods[1:] / likelihoods.sum()
     return shares

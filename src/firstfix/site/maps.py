@@ -1,21 +1,47 @@
-"""Prepared maps, loaded on demand within a limit of memory."""
+"""Prepared maps: files that are mapped into memory on demand, within a limit."""
 
 from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 
+import numpy as np
+from numpy.typing import NDArray
+
 from firstfix.core.errors import InputError
+from firstfix.core.grid import OccupancyGrid
+from firstfix.fields import cache
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.searchable import check_positions, check_searchable
 from firstfix.io.maps.map_server import load_map
+from firstfix.io.maps.map_yaml import MapYaml, read_yaml
 from firstfix.io.maps.site_yaml import SiteMap
 
 
+@dataclass(frozen=True, eq=False)
+class PreparedMap:
+    """A map with its fields, each computed or mapped at its first use.
+
+    Parameters
+    ----------
+    entry : SiteMap
+        What the files of the site say of it.
+    fields : MapFields
+        The map.
+    content : str
+        Hash of cells and resolution: maps that are copies have the same.
+    """
+
+    entry: SiteMap
+    fields: MapFields
+    content: str
+
+
 class PreparedMaps:
-    """The fields of maps by their ids; the least recently used are dropped.
+    """Prepared maps by their ids; the least recently used are dropped.
 
     Parameters
     ----------
@@ -24,7 +50,7 @@ class PreparedMaps:
     cache_dir : Path or None
         Folder of prepared maps; None prepares in memory.
     memory_limit : int
-        Size of the fields that are held, bytes; at least one map is.
+        Size of the maps that are held, bytes. One map is always held.
     """
 
     def __init__(
@@ -33,11 +59,11 @@ class PreparedMaps:
         self._maps = maps
         self._cache_dir = cache_dir
         self._limit = memory_limit
-        self._held: OrderedDict[str, MapFields] = OrderedDict()
+        self._held: OrderedDict[str, PreparedMap] = OrderedDict()
         self._lock = Lock()
 
-    def get(self, map_id: str) -> MapFields:
-        """Return the fields of a map; they are loaded, or prepared, if they are not held.
+    def get(self, map_id: str) -> PreparedMap:
+        """Return a map; it is mapped from its files, or prepared, if it is not held.
 
         Raises
         ------
@@ -46,34 +72,59 @@ class PreparedMaps:
         """
         with self._lock:
             held = self._held.get(map_id)
-            if held is not None:
-                self._held.move_to_end(map_id)
-                return held
-        if map_id not in self._maps:
-            raise InputError(f"There is no map {map_id!r:.60} in this site. Check map_ids.")
-        fields = self._prepared(self._maps[map_id])
+        if held is None:
+            if map_id not in self._maps:
+                raise InputError(f"There is no map {map_id!r:.60} in this site. Check map_ids.")
+            held = prepared(self._maps[map_id], self._cache_dir)
         with self._lock:
-            self._held[map_id] = fields
+            held = self._held.setdefault(map_id, held)
             self._held.move_to_end(map_id)
+            # The newest grows as its fields are used, so it counts at the next call.
             while len(self._held) > 1 and self.held_bytes > self._limit:
                 self._held.popitem(last=False)
-        return fields
+        return held
 
     @property
     def held_bytes(self) -> int:
         """Size of the maps that are held, bytes."""
-        return sum(_size(fields) for fields in self._held.values())
-
-    def _prepared(self, entry: SiteMap) -> MapFields:
-        grid = load_map(entry.path)
-        check_searchable(grid)
-        fields = MapFields(grid, self._cache_dir)
-        check_positions(fields)
-        fields.compute("squares", "clearance", "endpoints", "ranges")
-        return fields
+        return sum(held.fields.nbytes for held in self._held.values())
 
 
-def _size(fields: MapFields) -> int:
-    arrays = (fields.squares, fields.clearance, fields.endpoints.values, fields.ranges)
-    # cells, and the masks of occupied, free and unknown cells
-    return sum(array.nbytes for array in arrays) + 4 * fields.grid.cells.size
+def prepared(entry: SiteMap, cache_dir: Path | None) -> PreparedMap:
+    """Load a map; what is in the folder already is mapped, not computed.
+
+    Parameters
+    ----------
+    entry : SiteMap
+        The map.
+    cache_dir : Path or None
+        Folder of prepared maps; None reads the image and computes in memory.
+
+    Raises
+    ------
+    MapError
+        If the map cannot be read, or has nothing to be searched.
+    """
+    header = read_yaml(entry.path)
+    key = cache.content_key("cells 1", header.path.read_bytes(), header.image.read_bytes())
+    if cache_dir is None:
+        layers = _layers(entry.path)
+    else:
+        layers = cache.load_or_build(key, lambda: _layers(entry.path), cache_dir, limit=None)
+    grid = _grid_of(layers, header)
+    fields = MapFields(grid, cache_dir, key, cache_limit=None)
+    check_positions(fields)
+    return PreparedMap(entry, fields, cache.content_key(grid.cells, repr(grid.resolution)))
+
+
+def _layers(path: Path) -> NDArray[np.int8]:
+    """Read a map as one array: its cells and, where the file has them, its unseen cells."""
+    grid = load_map(path)
+    check_searchable(grid)
+    layers = [grid.cells] if grid.unseen is None else [grid.cells, grid.unseen.view(np.int8)]
+    return np.stack(layers)
+
+
+def _grid_of(layers: NDArray[np.int8], header: MapYaml) -> OccupancyGrid:
+    unseen = layers[1].view(np.bool_) if len(layers) > 1 else None
+    return OccupancyGrid(layers[0], header.resolution, header.T_map_grid, unseen)

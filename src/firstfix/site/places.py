@@ -17,7 +17,9 @@ class SitePlace:
     hypothesis : Hypothesis
         With ``map_id``; its probability is 0 until all maps are judged.
     log_likelihood : float
-        By the power law of the verdict, prior included; a wrong map has 0.
+        By the power law of the verdict, from the scans alone; a wrong map has 0.
+    prior_log : float
+        What was known before the scans: a log-likelihood up to 0.
     costs : tuple of float
         Mean cost of a beam at each view, oldest first.
     T_site_base : SE2 or None
@@ -30,10 +32,16 @@ class SitePlace:
 
     hypothesis: Hypothesis
     log_likelihood: float
+    prior_log: float
     costs: tuple[float, ...]
     T_site_base: SE2 | None
     content: str
     level: tuple[str | None, str | None]
+
+    @property
+    def log_posterior(self) -> float:
+        """By scans and prior together."""
+        return self.log_likelihood + self.prior_log
 
     @property
     def map_id(self) -> str:
@@ -48,7 +56,7 @@ class SiteCandidates:
     Parameters
     ----------
     places : tuple of SitePlace
-        Best first.
+        In no order.
     searched : tuple of str
         The maps that were searched.
     faults : tuple of str

@@ -1,4 +1,4 @@
-"""Places of many maps, refined and verified in one pool."""
+"""Places of many maps for one scan, refined and verified in one pool."""
 
 from __future__ import annotations
 
@@ -11,31 +11,29 @@ from numpy.typing import NDArray
 from firstfix.belief.prior import FLOOR
 from firstfix.core.estimate import Hypothesis
 from firstfix.core.scan import LaserScan
-from firstfix.fields.cache import content_key
-from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS, Beams
 from firstfix.global_localization.config import MAX_POSES
 from firstfix.global_localization.frames import bases_in_map
 from firstfix.global_localization.places import distinct_places
-from firstfix.global_localization.prior import PlacePrior
+from firstfix.global_localization.prior import DEEPER
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.search import search
 from firstfix.global_localization.sensors import joint_beams
-from firstfix.global_localization.verdict import WRONG_MAP_COST, log_likelihoods
+from firstfix.global_localization.verdict import WRONG_MAP_COST, log_likelihoods, with_prior
 from firstfix.global_localization.verify import verified_place, verify
-from firstfix.io.maps.site_yaml import SiteMap
+from firstfix.site.maps import PreparedMap
 from firstfix.site.places import SitePlace
 from firstfix.site.query import SiteQuery
 
-# Places of one map that may enter the pool, places of the pool that are refined, those whose beams
-# are all compared, and those refined on rays.
+# Places that one map may bring into the pool; places of the pool that are refined; those of which
+# all beams are compared; those that are refined on rays and listed.
 MAP_PLACES = 150
-POOL = 1000
+POOL_PLACES = 1000
 CAREFUL_PLACES = 64
 LISTED_PLACES = 24
 FIRST_BEAMS = 60
 
-Fields = Callable[[str], MapFields]
+Maps = Callable[[str], PreparedMap]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,135 +47,150 @@ class _Pool:
     poses : ndarray, shape (n, 3)
         x, y (cells), heading (rad).
     costs : ndarray, shape (n,)
-        Lower is better.
+        By the scan alone; lower is better.
+    logs : ndarray, shape (n,)
+        What is known before the scan: log-likelihoods up to 0.
     """
 
     maps: NDArray[np.int64]
     poses: NDArray[np.float64]
     costs: NDArray[np.float64]
+    logs: NDArray[np.float64]
 
     def take(self, index: NDArray[np.int64]) -> _Pool:
-        return _Pool(self.maps[index], self.poses[index], self.costs[index])
+        return _Pool(self.maps[index], self.poses[index], self.costs[index], self.logs[index])
 
-    def best(self, n: int) -> _Pool:
-        return self.take(np.argsort(self.costs, kind="stable")[:n])
+    def by_map(self) -> list[tuple[int, NDArray[np.int64]]]:
+        """Return each map with the indices of its poses."""
+        return [(i, np.flatnonzero(self.maps == i)) for i in np.unique(self.maps).tolist()]
+
+    def best(self, n: int, beams: int) -> _Pool:
+        """Keep the n best poses by the scan, and the n best with what is known before."""
+        kept = np.argsort(self.costs, kind="stable")[:n]
+        if self.logs.any():
+            weighed = with_prior(self.costs, self.logs, beams)
+            kept = np.union1d(kept, np.argsort(weighed, kind="stable")[:n])
+        return self.take(kept)
 
 
-def search_one_look(
-    query: SiteQuery, entries: Sequence[SiteMap], fields: Fields
-) -> tuple[SitePlace, ...]:
+def search_one_look(query: SiteQuery, map_ids: Sequence[str], maps: Maps) -> tuple[SitePlace, ...]:
     """Search several maps for one scan of each sensor.
 
     Parameters
     ----------
     query : SiteQuery
         One look.
-    entries : sequence of SiteMap
+    map_ids : sequence of str
         The maps; all can be loaded.
-    fields : callable
+    maps : callable
         Loads a map by its id.
 
     Returns
     -------
     tuple of SitePlace
-        At most `LISTED_PLACES`, best first; none if the scan has too few hits.
+        The best of all maps; none if the scan has too few hits.
     """
     scan, beams = joint_beams(query.scans)
     if int(np.count_nonzero(beams.hit)) < FEWEST_HITS:
         return ()
-    pool = _searched(query, entries, fields, scan, beams).best(POOL)
-    pool = _weighed(pool, entries, fields, beams, FIRST_BEAMS, refine_on_field)
-    pool = _distinct(pool, entries, fields, CAREFUL_PLACES)
-    pool = _distinct(
-        _weighed(pool, entries, fields, beams, None, None), entries, fields, LISTED_PLACES
-    )
-    places = [
+    pool = _searched(query, map_ids, maps, scan, beams)
+    pool = _refined(pool, map_ids, maps, beams)
+    pool = _distinct(pool, map_ids, maps, len(beams), CAREFUL_PLACES)
+    pool = _compared(pool, map_ids, maps, beams)
+    pool = _distinct(pool, map_ids, maps, len(beams), LISTED_PLACES)
+    return tuple(
         place
-        for i in np.unique(pool.maps).tolist()
-        for place in _described(
-            query, entries[i], fields(entries[i].id), scan, beams, pool.poses[pool.maps == i]
-        )
-    ]
-    return tuple(sorted(places, key=lambda place: -place.log_likelihood)[:LISTED_PLACES])
+        for i, here in pool.by_map()
+        for place in _described(query, maps(map_ids[i]), scan, beams, pool.poses[here])
+    )
 
 
 def _searched(
-    query: SiteQuery,
-    entries: Sequence[SiteMap],
-    fields: Fields,
-    scan: LaserScan,
-    beams: Beams,
+    query: SiteQuery, map_ids: Sequence[str], maps: Maps, scan: LaserScan, beams: Beams
 ) -> _Pool:
-    maps, poses, costs = [], [], []
-    for i, entry in enumerate(entries):
-        own = fields(entry.id)
-        known = PlacePrior(query.prior_in(entry.id), own.grid, scan, len(beams))
-        candidates, _ = search(beams, own, known.depth(MAP_PLACES), MAX_POSES)
-        chosen = known.chosen(candidates.poses, MAP_PLACES)
-        maps.append(np.full(len(chosen), i))
-        poses.append(chosen)
-        costs.append(candidates.scores[: len(chosen)])
-    return _Pool(np.concatenate(maps), np.concatenate(poses), np.concatenate(costs))
+    """Search every map, and keep the best places of all."""
+    found = []
+    for i, map_id in enumerate(map_ids):
+        fields = maps(map_id).fields
+        is_hinted = query.prior_in(map_id) is not None
+        # What is near a prior may be far down the list.
+        depth = MAP_PLACES * DEEPER if is_hinted else MAP_PLACES
+        candidates, _ = search(beams, fields, depth, MAX_POSES)
+        bases = bases_in_map(fields.grid, scan, candidates.poses)
+        logs = prior_logs(query, map_id, bases)
+        index = np.full(len(logs), i)
+        of_map = _Pool(index, candidates.poses, candidates.scores, logs)
+        found.append(of_map.best(MAP_PLACES, len(beams)))
+    return _joined(found).best(POOL_PLACES, len(beams))
 
 
-def _weighed(
-    pool: _Pool,
-    entries: Sequence[SiteMap],
-    fields: Fields,
-    beams: Beams,
-    used: int | None,
-    refine: Callable[[NDArray[np.float64], Beams, MapFields], NDArray[np.float64]] | None,
-) -> _Pool:
-    """Refine the poses of a pool, and compare beams with the map at each."""
+def _joined(pools: Sequence[_Pool]) -> _Pool:
+    return _Pool(
+        np.concatenate([pool.maps for pool in pools]),
+        np.concatenate([pool.poses for pool in pools]),
+        np.concatenate([pool.costs for pool in pools]),
+        np.concatenate([pool.logs for pool in pools]),
+    )
+
+
+def _refined(pool: _Pool, map_ids: Sequence[str], maps: Maps, beams: Beams) -> _Pool:
+    """Move the poses of a pool to where beams end on walls, and compare some beams there."""
     poses, costs = pool.poses.copy(), pool.costs.copy()
-    compared = beams if used is None else beams.thinned(used)
-    for i in np.unique(pool.maps).tolist():
-        own, here = fields(entries[i].id), pool.maps == i
-        if refine is not None:
-            poses[here] = refine(poses[here], beams, own)
-        costs[here] = verify(poses[here], compared, own).scores
-    return _Pool(pool.maps, poses, costs)
+    few = beams.thinned(FIRST_BEAMS)
+    for i, here in pool.by_map():
+        fields = maps(map_ids[i]).fields
+        poses[here] = refine_on_field(poses[here], beams, fields)
+        costs[here] = verify(poses[here], few, fields).scores
+    return _Pool(pool.maps, poses, costs, pool.logs)
 
 
-def _distinct(pool: _Pool, entries: Sequence[SiteMap], fields: Fields, most: int) -> _Pool:
+def _compared(pool: _Pool, map_ids: Sequence[str], maps: Maps, beams: Beams) -> _Pool:
+    """Compare all beams at the poses of a pool."""
+    costs = pool.costs.copy()
+    for i, here in pool.by_map():
+        costs[here] = verify(pool.poses[here], beams, maps(map_ids[i]).fields).scores
+    return replace(pool, costs=costs)
+
+
+def _distinct(pool: _Pool, map_ids: Sequence[str], maps: Maps, beams: int, most: int) -> _Pool:
     """Keep the best pose of each place, and the best places of all maps."""
     kept = []
-    for i in np.unique(pool.maps).tolist():
-        here = np.flatnonzero(pool.maps == i)
-        resolution = fields(entries[i].id).grid.resolution
-        kept.append(here[distinct_places(pool.poses[here], pool.costs[here], resolution, most)])
-    return pool.take(np.concatenate(kept)).best(most)
+    for i, here in pool.by_map():
+        resolution = maps(map_ids[i]).fields.grid.resolution
+        weighed = with_prior(pool.costs[here], pool.logs[here], beams)
+        kept += [
+            here[distinct_places(pool.poses[here], costs, resolution, most)]
+            for costs in ((pool.costs[here], weighed) if pool.logs.any() else (weighed,))
+        ]
+    return pool.take(np.unique(np.concatenate(kept))).best(most, beams)
 
 
 def _described(
     query: SiteQuery,
-    entry: SiteMap,
-    fields: MapFields,
+    prepared: PreparedMap,
     scan: LaserScan,
     beams: Beams,
     poses: NDArray[np.float64],
 ) -> list[SitePlace]:
     """Refine the best poses of one map on rays, and describe them."""
+    fields, map_id = prepared.fields, prepared.entry.id
     on_rays, covariances = refine_on_rays(poses, beams, fields)
     # Rays are more precise, but worse in a map with smeared walls: keep the better pose of the two.
     poses = np.concatenate([on_rays, poses])
     covariances = np.concatenate([covariances, covariances])
     verification = verify(poses, beams, fields)
     costs = verification.scores
-    kept = distinct_places(poses, costs, fields.grid.resolution, LISTED_PLACES)
     logs = log_likelihoods(np.append(costs, WRONG_MAP_COST), len(beams))
-    logs = (
-        logs[:-1] - logs[-1] + prior_logs(query, entry.id, bases_in_map(fields.grid, scan, poses))
-    )
+    before = prior_logs(query, map_id, bases_in_map(fields.grid, scan, poses))
     return [
         as_place(
             verified_place(fields.grid, scan, verification, i, covariances[i], 0.0),
-            entry,
-            fields,
-            float(logs[i]),
+            prepared,
+            float(logs[i] - logs[-1]),
+            float(before[i]),
             (float(costs[i]),),
         )
-        for i in kept.tolist()
+        for i in distinct_places(poses, costs, fields.grid.resolution, LISTED_PLACES).tolist()
     ]
 
 
@@ -193,18 +206,19 @@ def prior_logs(query: SiteQuery, map_id: str, poses: NDArray[np.float64]) -> NDA
 
 def as_place(
     hypothesis: Hypothesis,
-    entry: SiteMap,
-    fields: MapFields,
+    prepared: PreparedMap,
     log_likelihood: float,
+    prior_log: float,
     costs: tuple[float, ...],
 ) -> SitePlace:
     """Return a place of a map with what the verdict needs to know of the map."""
-    pose = hypothesis.pose
+    entry, pose = prepared.entry, hypothesis.pose
     return SitePlace(
         hypothesis=replace(hypothesis, map_id=entry.id),
         log_likelihood=log_likelihood,
+        prior_log=prior_log,
         costs=costs,
         T_site_base=None if entry.T_site_map is None else entry.T_site_map @ pose,
-        content=content_key(fields.grid.cells, repr(fields.grid.resolution)),
+        content=prepared.content,
         level=(entry.building, entry.floor),
     )

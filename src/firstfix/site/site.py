@@ -12,6 +12,7 @@ from firstfix.core.errors import FirstfixError, InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.fields.cache import remove_unused
 from firstfix.fields.map_fields import MapFields
 from firstfix.io.maps.site_yaml import SiteDescription, SiteMap, Transition, read_site
 from firstfix.site.judge import judge_site
@@ -25,6 +26,9 @@ from firstfix.site.views import search_views
 
 MEMORY_LIMIT = 2 << 30
 """Default size of the prepared maps that are held at once, bytes."""
+
+UNUSED_DAYS = 90.0
+"""Files of prepared maps that no site has read for so long are removed."""
 
 
 class Site:
@@ -58,6 +62,7 @@ class Site:
     ) -> None:
         self._entries = {entry.id: entry for entry in description.maps}
         self._transitions = description.transitions
+        self._cache_dir = cache_dir
         self._maps = PreparedMaps(self._entries, cache_dir, memory_limit)
         self._faults: dict[str, str] = {}
 
@@ -114,11 +119,11 @@ class Site:
         InputError
             If there is no such map, or it cannot be used.
         """
-        return self._maps.get(map_id)
+        return self._maps.get(map_id).fields
 
     def grid(self, map_id: str) -> OccupancyGrid:
         """Return a map."""
-        return self._maps.get(map_id).grid
+        return self.fields(map_id).grid
 
     def prepare(self, done: Callable[[str], None] = lambda _: None) -> None:
         """Prepare all maps now, so that no scan waits for it.
@@ -129,8 +134,11 @@ class Site:
             Called with the id of each map when it is ready, or found to be unusable.
         """
         for entry in self._entries.values():
-            self._is_usable(entry)
+            if self._is_usable(entry):
+                self.fields(entry.id).compute("squares", "clearance", "endpoints", "ranges")
             done(entry.id)
+        if self._cache_dir is not None:
+            remove_unused(self._cache_dir, UNUSED_DAYS)
 
     def locate(
         self,
@@ -214,12 +222,12 @@ class Site:
         InputError
             If one of the maps is not in the site.
         """
-        entries = [entry for entry in map(self._entry, map_ids) if self._is_usable(entry)]
+        usable = [name for name in map_ids if self._is_usable(self._entry(name))]
         search_maps = search_one_look if query.is_one_look else search_views
-        places = search_maps(query, entries, self._maps.get) if entries else ()
+        places = search_maps(query, usable, self._maps.get) if usable else ()
         return SiteCandidates(
             places,
-            searched=tuple(entry.id for entry in entries),
+            searched=tuple(usable),
             faults=tuple(self._faults[name] for name in map_ids if name in self._faults),
         )
 

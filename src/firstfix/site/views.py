@@ -15,49 +15,56 @@ from firstfix.belief.evidence import (
     log_likelihoods,
     novelty,
 )
+from firstfix.belief.hints import hint_logs
+from firstfix.belief.prior import FLOOR
 from firstfix.belief.several import distinct_views
-from firstfix.fields.map_fields import MapFields
-from firstfix.io.maps.site_yaml import SiteMap
+from firstfix.site.maps import PreparedMap
 from firstfix.site.places import SitePlace
 from firstfix.site.query import SiteQuery
-from firstfix.site.search import Fields, as_place, prior_logs
+from firstfix.site.search import Maps, as_place
 
 
-def search_views(
-    query: SiteQuery, entries: Sequence[SiteMap], fields: Fields
-) -> tuple[SitePlace, ...]:
+def search_views(query: SiteQuery, map_ids: Sequence[str], maps: Maps) -> tuple[SitePlace, ...]:
     """Search several maps for several scans of a robot that moved.
 
     Parameters
     ----------
     query : SiteQuery
         Several views.
-    entries : sequence of SiteMap
+    map_ids : sequence of str
         The maps; all can be loaded.
-    fields : callable
+    maps : callable
         Loads a map by its id.
 
     Returns
     -------
     tuple of SitePlace
-        Best first.
+        Those that the belief of each map lists.
     """
-    places = [place for entry in entries for place in _places(query, entry, fields(entry.id))]
-    return tuple(sorted(places, key=lambda place: -place.log_likelihood))
+    return tuple(place for map_id in map_ids for place in _places(query, maps(map_id)))
 
 
-def _places(query: SiteQuery, entry: SiteMap, fields: MapFields) -> list[SitePlace]:
-    belief = begin(fields, query.prior_in(entry.id))
+def _places(query: SiteQuery, prepared: PreparedMap) -> list[SitePlace]:
+    map_id = prepared.entry.id
+    belief = begin(prepared.fields, query.prior_in(map_id))
     for view in distinct_views(query.scans, query.T_odom_base):
         if brings_news(belief, view.T_odom_base) or view.T_odom_base is query.T_odom_base[-1]:
             belief = update(belief, view)
     if not belief.window:
         return []
     logs = joint_logs(belief)
-    elsewhere = query.prior is not None and entry.id not in query.prior
-    logs += prior_logs(query, entry.id, belief.poses) if elsewhere else 0.0
+    if query.prior is not None and map_id not in query.prior:
+        before = np.full(len(logs), FLOOR)
+    else:
+        before = hint_logs(belief.tracks.now, belief.window[-1], belief.hints, prepared.fields.grid)
     return [
-        as_place(hypothesis, entry, fields, float(logs[i]), tuple(belief.tracks.costs[i].tolist()))
+        as_place(
+            hypothesis,
+            prepared,
+            float(logs[i]),
+            float(before[i]),
+            tuple(belief.tracks.costs[i].tolist()),
+        )
         for i, hypothesis in enumerate(belief.places)
     ]
 
