@@ -23,12 +23,13 @@ from firstfix.web.commands import (
     Pause,
     PickPlace,
     Relocalize,
+    RunAmcl,
     SelectSensor,
     SelectWorld,
     SetPeople,
     SetPose,
 )
-from firstfix.web.snapshot import SimulationStatus
+from firstfix.web.snapshot import AmclStart, SimulationStatus
 
 
 class Recorder:
@@ -108,6 +109,7 @@ def test_a_place_that_is_no_longer_listed_is_refused(ambiguous):
         (CoverSensor(True), ("cover_sensor", True)),
         (SelectSensor("60° x 5 m"), ("select_sensor", "60° x 5 m")),
         (SelectWorld("office"), ("select_world", "office")),
+        (RunAmcl(AmclStart.POSE), ("run_amcl", AmclStart.POSE)),
     ],
 )
 def test_commands_of_the_simulation(ambiguous, command: Command, call: tuple[Any, ...]):

@@ -28,6 +28,7 @@ GOOD = {
     "sensor": {"name": "60° x 5 m"},
     "world": {"name": "office"},
     "decide": {},
+    "amcl": {"start": "pose"},
     "token": {"token": "secret"},
 }
 json_values = st.recursive(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -319,5 +320,29 @@ def test_sensor_and_world_are_chosen_from_menus(changing_server: Server, visit: 
     page.wait_for_state("DISAMBIGUATING")
     assert page.page.input_value("#sensor") == "180° x 8 m"
     assert page.page.inner_text("#map-name") == "rooms"
-    simulation = {"world": "rooms", "sensor": "180° x 8 m", "covered": False}
+    simulation = {"world": "rooms", "sensor": "180° x 8 m", "covered": False, "amcl": "off"}
     assert changing_server.status()["simulation"] == simulation
+
+
+def test_a_plain_amcl_is_a_second_robot_that_a_kidnap_leaves_behind(
+    page: Visit, tmp_path: Path
+) -> None:
+    page.page.select_option("#amcl", "pose")
+    wait_until(lambda: page.pose("amcl"), lambda: "AMCL starts")
+    page.page.click("#kidnap")
+    match = page.wait_for_event(r"Kidnapped, with no signal: now at \((-?[\d.]+), (-?[\d.]+)\)")
+    wait_until(lambda: page.pose() and is_near_truth(page, 0.3, 0.2), lambda: f"{page.pose()}")
+    page.page.click("#pause")
+    page.page.wait_for_selector("#paused", state="visible")
+    x, y, yaw = page.pose("amcl")
+    assert math.dist((x, y), (float(match[1]), float(match[2]))) > 0.5
+    assert float(page.page.inner_text("#amcl-error").split()[0]) > 0.5
+    edge = 9.0 / page.scale  # of its square, on the right of it
+    side = page.colour("overlay", x + edge * math.sin(yaw), y - edge * math.cos(yaw))
+    assert side[0] > side[1] + 60  # magenta
+    page.shot(tmp_path / "amcl.png")
+    print(tmp_path / "amcl.png")  # noqa: T201 - for people
+    page.page.click("#pause")
+    page.page.select_option("#amcl", "off")
+    wait_until(lambda: not page.pose("amcl"), lambda: "AMCL ends")
+    page.page.wait_for_selector("#amcl-row", state="hidden")

@@ -20,6 +20,7 @@ from firstfix.web.commands import (
     Pause,
     PickPlace,
     Relocalize,
+    RunAmcl,
     SelectSensor,
     SelectWorld,
     SetPeople,
@@ -27,10 +28,26 @@ from firstfix.web.commands import (
     SimulationCommand,
 )
 from firstfix.web.messages import Menus
-from firstfix.web.snapshot import SimulationStatus
+from firstfix.web.snapshot import AmclStart, SimulationStatus
 from firstfix.web.snapshot_store import SnapshotStore
 
-ABILITIES = ("goal", "carry", "people", "pause", "kidnap", "cover", "sensor", "world", "decide")
+ABILITIES = (
+    "goal",
+    "carry",
+    "people",
+    "pause",
+    "kidnap",
+    "cover",
+    "sensor",
+    "world",
+    "decide",
+    "amcl",
+)
+_AMCL_EVENTS = {
+    AmclStart.OFF: "Plain AMCL ended",
+    AmclStart.POSE: "Plain AMCL runs beside it, from the last published pose",
+    AmclStart.UNIFORM: "Plain AMCL runs beside it, from anywhere",
+}
 
 
 class ControllableRobot(Protocol):
@@ -77,6 +94,9 @@ class ControllableRobot(Protocol):
 
     def select_world(self, name: str) -> None:
         """Restart the simulation in another world."""
+
+    def run_amcl(self, start: AmclStart) -> None:
+        """Run a plain AMCL beside the localizer, or end it."""
 
 
 class CommandExecutor:
@@ -177,6 +197,9 @@ class CommandExecutor:
             case SelectWorld(name=name):
                 robot.select_world(name)
                 event = f"World: {name}. The simulation restarts."
+            case RunAmcl(start=start):
+                robot.run_amcl(start)
+                event = _AMCL_EVENTS[start]
         self._store.set_simulation(robot.status)
         self._store.add_event("person", event)
 

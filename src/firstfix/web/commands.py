@@ -7,6 +7,7 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from firstfix.core.se2 import SE2
+from firstfix.web.snapshot import AmclStart
 
 # Larger than any building, and small enough for indices of cells.
 FARTHEST_M = 1e6
@@ -97,6 +98,12 @@ class Decide(Struct, frozen=True, tag_field="type", tag="decide"):
     """Let the simulated robot execute the deciding motion."""
 
 
+class RunAmcl(Struct, frozen=True, tag_field="type", tag="amcl"):
+    """Run a plain AMCL beside the localizer of the simulated robot, or end it."""
+
+    start: Annotated[AmclStart, Meta(description="off, pose (the last one), uniform")]
+
+
 class Token(Struct, frozen=True, tag_field="type", tag="token"):
     """Authenticate; the first message where the server asks for a token."""
 
@@ -104,7 +111,16 @@ class Token(Struct, frozen=True, tag_field="type", tag="token"):
 
 
 SimulationCommand = (
-    Pause | DriveTo | Carry | SetPeople | Kidnap | CoverSensor | SelectSensor | SelectWorld | Decide
+    Pause
+    | DriveTo
+    | Carry
+    | SetPeople
+    | Kidnap
+    | CoverSensor
+    | SelectSensor
+    | SelectWorld
+    | Decide
+    | RunAmcl
 )
 Command = SetPose | PickPlace | Relocalize | SimulationCommand
 ClientMessage = Command | Token

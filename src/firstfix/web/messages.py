@@ -5,14 +5,16 @@ from __future__ import annotations
 from typing import Annotated
 
 import msgspec
+import numpy as np
 from msgspec import Meta, Struct
+from numpy.typing import NDArray
 
 from firstfix import __version__
 from firstfix.core.estimate import Evidence, Hypothesis, SearchReport, Verdict
 from firstfix.core.se2 import SE2
 from firstfix.localizer.states import State
 from firstfix.web.map_png import png_layout
-from firstfix.web.snapshot import ActiveMap, Snapshot
+from firstfix.web.snapshot import ActiveMap, AmclStart, SimulationStatus, Snapshot
 from firstfix.web.timeline import Event
 
 Count = Annotated[int, Meta(ge=0)]
@@ -82,11 +84,21 @@ class Motion(Struct, frozen=True):
 
 
 class Simulation(Struct, frozen=True):
-    """World and sensor of a simulated robot, and whether the sensor is covered."""
+    """World and sensor of a simulated robot, whether the sensor is covered, and plain AMCL."""
 
     world: str
     sensor: str
     covered: bool
+    amcl: AmclStart
+
+
+class Amcl(Struct, frozen=True):
+    """What a plain AMCL believes, which runs beside the localizer of a simulated robot."""
+
+    pose: Pose
+    covariance: Annotated[
+        tuple[float, float, float, float], Meta(description="xx, xy, yy, yaw yaw")
+    ]
 
 
 class Menus(Struct, frozen=True):
@@ -139,6 +151,7 @@ class Status(Struct, frozen=True, tag_field="type", tag="state"):
     truth: Pose | None
     paused: bool
     simulation: Simulation | None
+    amcl: Amcl | None
     viewers: Count
 
     @classmethod
@@ -151,7 +164,7 @@ class Status(Struct, frozen=True, tag_field="type", tag="state"):
             state=snapshot.state,
             reason=snapshot.reason,
             pose=None if pose is None else as_tuple(pose),
-            covariance=_covariance(snapshot),
+            covariance=None if snapshot.covariance is None else _upper(snapshot.covariance),
             hypotheses=[Place.of(hypothesis) for hypothesis in snapshot.hypotheses],
             rivals=snapshot.rivals,
             chosen_by=snapshot.chosen_by,
@@ -163,7 +176,8 @@ class Status(Struct, frozen=True, tag_field="type", tag="state"):
             motion=None if motion is None else Motion(motion.turn, motion.ahead),
             truth=None if snapshot.truth is None else as_tuple(snapshot.truth),
             paused=sim is not None and sim.is_paused,
-            simulation=None if sim is None else Simulation(sim.world, sim.sensor, sim.is_covered),
+            simulation=_simulation(sim),
+            amcl=_amcl(snapshot),
             viewers=viewers,
         )
 
@@ -221,6 +235,16 @@ def _belief(snapshot: Snapshot) -> BeliefSummary | None:
     return BeliefSummary(len(belief.probabilities), belief.elsewhere)
 
 
-def _covariance(snapshot: Snapshot) -> tuple[float, float, float, float] | None:
-    P = snapshot.covariance
-    return None if P is None else (float(P[0, 0]), float(P[0, 1]), float(P[1, 1]), float(P[2, 2]))
+def _simulation(status: SimulationStatus | None) -> Simulation | None:
+    if status is None:
+        return None
+    return Simulation(status.world, status.sensor, status.is_covered, status.amcl)
+
+
+def _amcl(snapshot: Snapshot) -> Amcl | None:
+    amcl = snapshot.amcl
+    return None if amcl is None else Amcl(as_tuple(amcl.T_map_base), _upper(amcl.covariance))
+
+
+def _upper(P: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    return float(P[0, 0]), float(P[0, 1]), float(P[1, 1]), float(P[2, 2])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,14 +57,31 @@ class ParticleCloud:
     T_map_base: SE2
 
 
+class AmclStart(Enum):
+    """Whether a plain AMCL runs beside the localizer, and where it starts."""
+
+    OFF = "off"
+    POSE = "pose"  # the last pose that was published
+    UNIFORM = "uniform"  # all free space
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class AmclEstimate:
+    """The pose of a plain AMCL (``T_map_base``), and its covariance, shape (3, 3)."""
+
+    T_map_base: SE2
+    covariance: NDArray[np.float64]
+
+
 @dataclass(frozen=True, slots=True)
 class SimulationStatus:
-    """What viewers can change in the simulation: world, sensor, clock, and its cover."""
+    """What viewers can change in the simulation: world, sensor, clock, cover, and plain AMCL."""
 
     world: str
     sensor: str
     is_paused: bool = False
     is_covered: bool = False
+    amcl: AmclStart = AmclStart.OFF
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -108,6 +126,8 @@ class Snapshot:
         ``T_map_base`` of a simulated robot.
     simulation : SimulationStatus or None
         None for a real robot.
+    amcl : AmclEstimate or None
+        What a plain AMCL believes, where one runs beside the localizer.
     """
 
     map: ActiveMap | None = None
@@ -128,3 +148,4 @@ class Snapshot:
     time_to_fix_s: float | None = None
     truth: SE2 | None = None
     simulation: SimulationStatus | None = None
+    amcl: AmclEstimate | None = None

@@ -17,6 +17,7 @@ from firstfix.localizer.outputs import Hypotheses, MotionRequest, Output, Status
 from firstfix.localizer.states import State
 from firstfix.web.snapshot import (
     ActiveMap,
+    AmclEstimate,
     ParticleCloud,
     RegisteredScan,
     SimulationStatus,
@@ -77,6 +78,15 @@ class SnapshotStore:
         """Set the true pose of a simulated robot, before its scan."""
         with self._lock:
             self._snapshot = replace(self._snapshot, truth=truth)
+
+    def set_amcl(self, amcl: AmclEstimate | None) -> None:
+        """Set what a plain AMCL beside the localizer believes; None if none runs."""
+        with self._lock:
+            self._snapshot = replace(self._snapshot, amcl=amcl)
+
+    def skip_time(self) -> None:
+        """Do not count the processor time of this thread since the last input."""
+        self._timing.start_input()
 
     def set_simulation(self, simulation: SimulationStatus) -> None:
         """Set the status of the simulation."""

@@ -22,6 +22,7 @@ from firstfix.localizer.inputs import NewMap, PoseHint
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import InitialPose
 from firstfix.localizer.states import State
+from firstfix.web.snapshot import AmclEstimate, AmclStart
 
 HOUSE = WORLDS["house"]()
 
@@ -37,6 +38,7 @@ class Diary:
         self.map_names: list[str] = []
         self.threads: set[str] = set()
         self.state = State.NO_MAP
+        self.amcl: AmclEstimate | None = None
         self._observer = observer
 
     def __call__(self, given: Any, outputs: list[Any], localizer: Localizer) -> None:
@@ -49,6 +51,12 @@ class Diary:
 
     def set_truth(self, T_map_base: SE2) -> None:
         self.truths.append(T_map_base)
+
+    def set_amcl(self, amcl: AmclEstimate | None) -> None:
+        self.amcl = amcl
+
+    def skip_time(self) -> None:
+        """Measure nothing."""
 
     def set_map_name(self, name: str) -> None:
         self.map_names.append(name)
@@ -148,3 +156,21 @@ def test_a_covered_sensor_keeps_the_pose():
         seen = len(diary.given)
         until(lambda: sum(isinstance(given, LaserScan) for given in diary.given[seen:]) > 20)
         assert diary.state is State.LOCALIZED
+
+
+def test_a_plain_amcl_stays_where_the_robot_was_kidnapped():
+    robot = SimulatedRobot(HOUSE, 1)
+    with running(robot) as (_, diary):
+        until(lambda: diary.state is State.LOCALIZED)
+        robot.run_amcl(AmclStart.POSE)
+        until(lambda: diary.amcl)
+        before = diary.amcl.T_map_base
+        assert before.distance_to(robot.T_map_base) < 0.5
+        robot.kidnap()
+        until(lambda: diary.truths[-1].distance_to(before) > 1.0)
+        seen = len(diary.given)
+        until(lambda: sum(isinstance(given, LaserScan) for given in diary.given[seen:]) > 5)
+        assert diary.amcl.T_map_base.distance_to(before) < 0.5
+        robot.run_amcl(AmclStart.OFF)
+        until(lambda: diary.amcl is None)
+    assert diary.warnings == []

@@ -8,14 +8,18 @@ import traceback
 from collections.abc import Callable, Sequence
 
 from firstfix.core.errors import InputError
+from firstfix.core.se2 import SE2
 from firstfix.fields.cache import cache_folder
+from firstfix.lab.live.plain_amcl import PlainAmcl
 from firstfix.lab.live.simulated_robot import SimulatedRobot
-from firstfix.lab.simulation.simulation import PERIOD_S
+from firstfix.lab.simulation.simulation import PERIOD_S, Moment
 from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
+from firstfix.localizer.outputs import TrackedPose
 from firstfix.localizer.precompile import precompile
 from firstfix.ros.inbox import Inbox
 from firstfix.ros.node import Watcher
+from firstfix.web.snapshot import AmclStart
 from firstfix.web.snapshot_store import SnapshotStore
 
 # Longest wait for the present step at the end.
@@ -53,6 +57,8 @@ class SimulatedNode:
         self._watchers: tuple[Watcher, ...] = (store, *watchers)
         self._inbox: Inbox[Input] = Inbox()
         self._starts = robot.starts
+        self._amcl: PlainAmcl | None = None
+        self._known: SE2 | None = None  # the last published pose
         self._localizer = Localizer(cache_dir=cache_folder())
         self._thread = threading.Thread(target=self._run, name="firstfix", daemon=True)
 
@@ -86,19 +92,36 @@ class SimulatedNode:
         if self._robot.starts != self._starts:
             self._restart()
         elif moment is not None:
+            self._follow_with_amcl(moment)
             self._store.set_truth(moment.T_map_base)
+            self._store.skip_time()  # of the simulation
             for event in moment.events:
                 self._handle(event)
+
+    def _follow_with_amcl(self, moment: Moment) -> None:
+        start = self._robot.status.amcl
+        if start is AmclStart.OFF:
+            self._store.set_amcl(None)
+            self._amcl = None
+            return
+        if self._amcl is None or self._amcl.start is not start:
+            self._amcl = PlainAmcl(self._robot.grid, start)
+        self._amcl.follow(moment.events, self._known)
+        self._store.set_amcl(self._amcl.estimate)
 
     def _restart(self) -> None:
         """Begin again in a world, whose clock starts at zero."""
         self._starts = self._robot.starts
+        self._amcl = self._known = None
         self._localizer = Localizer(cache_dir=cache_folder())
         self._store.set_map_name(self._robot.status.world)
         self._handle(NewMap(0.0, self._robot.grid))
 
     def _handle(self, given: Input) -> None:
         outputs = self._localizer.handle(given)
+        for output in outputs:
+            if isinstance(output, TrackedPose):
+                self._known = output.T_map_base
         for watch in self._watchers:
             watch(given, outputs, self._localizer)
 

@@ -19,7 +19,7 @@ from firstfix.lab.scenarios.scenario import Scenario, check_room, start_simulati
 from firstfix.lab.simulation.rigs import RIGS, Rig
 from firstfix.lab.simulation.simulation import Moment
 from firstfix.lab.worlds.catalog import STARTS, WORLDS, random_free_pose
-from firstfix.web.snapshot import SimulationStatus
+from firstfix.web.snapshot import AmclStart, SimulationStatus
 
 MOST_PEOPLE = 30
 
@@ -66,6 +66,7 @@ class SimulatedRobot:
         self._given = world, grid
         self._sensor = next(iter(SENSORS))
         self._is_paused = self._is_covered = False
+        self._amcl = AmclStart.OFF
         self._starts = 0
         self._plan: Iterator[Moment]
         self._enter(world, grid)
@@ -87,8 +88,10 @@ class SimulatedRobot:
 
     @property
     def status(self) -> SimulationStatus:
-        """World, sensor, and whether the clock is stopped or the sensor covered."""
-        return SimulationStatus(self._world, self._sensor, self._is_paused, self._is_covered)
+        """World, sensor, whether the clock is stopped or the sensor covered, and plain AMCL."""
+        return SimulationStatus(
+            self._world, self._sensor, self._is_paused, self._is_covered, self._amcl
+        )
 
     @property
     def worlds(self) -> tuple[str, ...]:
@@ -189,6 +192,10 @@ class SimulatedRobot:
     def cover_sensor(self, *, covered: bool) -> None:
         """Cover or uncover the sensor: covered, all ranges are shorter than `range_min`."""
         self._is_covered = covered
+
+    def run_amcl(self, start: AmclStart) -> None:
+        """Let a plain AMCL run beside the localizer, or end it."""
+        self._amcl = start
 
     def select_sensor(self, name: str) -> None:
         """Exchange the sensor.

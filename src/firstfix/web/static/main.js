@@ -80,6 +80,7 @@ function takeState(state) {
   byId("decide").hidden = !state.motion || !actions.canDecide;
   app.dataset.pose = numbers(state.pose);
   app.dataset.truth = numbers(state.truth);
+  app.dataset.amcl = numbers(state.amcl?.pose);
   redraw();
 }
 

@@ -139,6 +139,8 @@ export class Panel {
     setText(byId("spread"), pose && covariance ? spreadText(covariance) : "–");
     byId("error-row").hidden = !truth;
     setText(byId("error"), pose && truth ? errorText(pose, truth) : "–");
+    byId("amcl-row").hidden = (state.simulation?.amcl ?? "off") === "off";
+    setText(byId("amcl-error"), state.amcl && truth ? errorText(state.amcl.pose, truth) : "no pose yet");
     setText(byId("belief"), format.beliefText(state.belief));
     const fix = state.time_to_fix_s;
     setText(byId("time-to-fix"), fix == null ? "–" : format.seconds(fix));

@@ -1,5 +1,6 @@
 /** Two canvases, one for the map and one for what moves on it; drawn only after a change. */
 
+import { drawAmcl } from "./layers/amcl.js";
 import { drawBelief } from "./layers/belief.js";
 import { drawDraft, drawGoal } from "./layers/draft.js";
 import { drawGrid } from "./layers/grid.js";
@@ -84,6 +85,7 @@ export class Renderer {
     if (shown.particles && scene.particles) drawParticles(ctx, view, scene.particles, colours);
     if (scene.goal) drawGoal(ctx, view, scene.goal, pose, colours);
     if (shown.truth && state?.truth) drawTruth(ctx, view, state.truth, colours);
+    if (state?.amcl) drawAmcl(ctx, view, state.amcl, colours);
     if (pose) drawRobot(ctx, view, state, colours);
     if (hypotheses.length) drawHypotheses(ctx, view, hypotheses, scene.highlighted, colours);
     if (scene.draft) drawDraft(ctx, view, scene.draft, colours);

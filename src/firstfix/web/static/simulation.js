@@ -1,4 +1,4 @@
-/** The controls of a simulated robot: world, sensor, cover, people, pause. */
+/** The controls of a simulated robot: world, sensor, plain AMCL, cover, people, pause. */
 
 const byId = (id) => document.getElementById(id);
 
@@ -10,6 +10,7 @@ export class Simulation {
     this.#send = send;
     byId("world").addEventListener("change", () => send({ type: "world", name: byId("world").value }));
     byId("sensor").addEventListener("change", () => send({ type: "sensor", name: byId("sensor").value }));
+    byId("amcl").addEventListener("change", () => send({ type: "amcl", start: byId("amcl").value }));
     byId("cover").addEventListener("click", () => {
       send({ type: "cover", covered: byId("cover").getAttribute("aria-pressed") !== "true" });
     });
@@ -35,7 +36,8 @@ export class Simulation {
     byId("pause-text").textContent = paused ? "Resume" : "Pause";
     byId("pause-icon").setAttribute("href", paused ? "#i-play" : "#i-pause");
     if (!simulation) return;
-    const { world, sensor, covered } = simulation;
+    const { world, sensor, covered, amcl } = simulation;
+    if (document.activeElement !== byId("amcl")) byId("amcl").value = amcl;
     if (document.activeElement !== byId("world")) byId("world").value = world;
     if (document.activeElement !== byId("sensor")) byId("sensor").value = sensor;
     byId("cover").setAttribute("aria-pressed", String(covered));

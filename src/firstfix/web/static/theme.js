@@ -6,7 +6,7 @@ const KEY = "firstfix-theme";
 const BY_SYSTEM = "(prefers-color-scheme: dark)";
 const NAMES = [
   "ground", "free", "wall", "grid", "surface", "text", "muted", "robot", "robot-ink", "particle",
-  "trail", "truth", "chosen", "hypothesis", "goal", "explained", "short", "through-wall", "unknown", "on-accent",
+  "trail", "truth", "chosen", "hypothesis", "goal", "amcl", "explained", "short", "through-wall", "unknown", "on-accent",
 ];
 
 export class Theme {

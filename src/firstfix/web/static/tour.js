@@ -34,6 +34,7 @@ const STEPS = [
   {
     title: "Kidnapped without a signal",
     act(tour) {
+      tour.send({ type: "amcl", start: "pose" });
       tour.send({ type: "kidnap" });
     },
     text(state, seen) {
@@ -47,13 +48,16 @@ const STEPS = [
       if (!seen.wasWrong || !isRight) {
         return "It was teleported. No sensor reports it, and the wheels claim that it stands still.";
       }
-      seen.done = `Noticed and found again ${seconds(state.stamp - seen.from)} later, without help.`;
+      const off = error({ pose: state.amcl?.pose, truth: state.truth });
+      const plain = off < Infinity ? ` Plain AMCL (the square) is ${length(off)} off.` : "";
+      seen.done = `Noticed and found again ${seconds(state.stamp - seen.from)} later, without help.${plain}`;
       return seen.done;
     },
   },
   {
     title: "Rooms that look alike",
     act(tour) {
+      tour.send({ type: "amcl", start: "off" });
       tour.enter(ALIKE);
     },
     text(state, seen, tour) {
