@@ -331,11 +331,15 @@ def test_a_plain_amcl_is_a_second_robot_that_a_kidnap_leaves_behind(
     wait_until(lambda: page.pose("amcl"), lambda: "AMCL starts")
     page.page.click("#kidnap")
     match = page.wait_for_event(r"Kidnapped, with no signal: now at \((-?[\d.]+), (-?[\d.]+)\)")
-    wait_until(lambda: page.pose() and is_near_truth(page, 0.3, 0.2), lambda: f"{page.pose()}")
+    there = float(match[1]), float(match[2])
+    wait_until(
+        lambda: page.pose() and math.dist(page.pose()[:2], there) < 0.5 and page.pose("amcl"),
+        lambda: f"{page.pose()}, not {there}",
+    )
     page.page.click("#pause")
     page.page.wait_for_selector("#paused", state="visible")
     x, y, yaw = page.pose("amcl")
-    assert math.dist((x, y), (float(match[1]), float(match[2]))) > 0.5
+    assert math.dist((x, y), there) > 0.5
     assert float(page.page.inner_text("#amcl-error").split()[0]) > 0.5
     edges = [pixels / page.scale for pixels in (8.0, 8.5, 9.0, 9.5, 10.0)]  # of its square
     side = [page.colour("overlay", x + e * math.sin(yaw), y - e * math.cos(yaw)) for e in edges]

@@ -82,6 +82,8 @@ class PlainAmcl:
             return
         self._track = self._tracker.begin(particles, T_odom_base, scan, self._rng)
 
-    def _draw(self, _: LaserScan, n: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    def _draw(
+        self, _: tuple[LaserScan, ...], n: int, rng: np.random.Generator
+    ) -> NDArray[np.float64]:
         """Draw from free space; Nav2 recovers only where its recovery is switched on."""
         return free_poses(self._grid, n, rng)
