@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from firstfix.amcl.config import AmclConfig, MotionModel, SensorModel
     from firstfix.belief.prior import All, AnyOf, Near, Region
+    from firstfix.changes.counts import ChangeCounter
+    from firstfix.changes.survey import Change, MapChanges, find_changes
     from firstfix.core.deskew import deskew
     from firstfix.core.errors import FirstfixError, InputError, MapError, ScanError
     from firstfix.core.estimate import Evidence, Hypothesis, LocateResult, SearchReport, Verdict
@@ -43,10 +45,13 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-__all__ = [  # noqa: RUF022 - in plain alphabetical order
+__all__ = [
+    "SE2",
     "All",
     "AmclConfig",
     "AnyOf",
+    "Change",
+    "ChangeCounter",
     "Event",
     "Evidence",
     "FirstfixError",
@@ -60,6 +65,7 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "LocalizerConfig",
     "LocateConfig",
     "LocateResult",
+    "MapChanges",
     "MapError",
     "Method",
     "MonitorConfig",
@@ -75,7 +81,6 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "Recording",
     "Region",
     "Reset",
-    "SE2",
     "ScanError",
     "ScanMatcher",
     "SearchReport",
@@ -90,6 +95,7 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "Trajectory",
     "Verdict",
     "deskew",
+    "find_changes",
     "load_map",
     "load_recording",
     "load_trajectory",
@@ -106,6 +112,8 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
 _MODULES = {
     "amcl.config": ("AmclConfig", "MotionModel", "SensorModel"),
     "belief.prior": ("All", "AnyOf", "Near", "Region"),
+    "changes.counts": ("ChangeCounter",),
+    "changes.survey": ("Change", "MapChanges", "find_changes"),
     "core.deskew": ("deskew",),
     "core.errors": ("FirstfixError", "InputError", "MapError", "ScanError"),
     "core.estimate": ("Evidence", "Hypothesis", "LocateResult", "SearchReport", "Verdict"),

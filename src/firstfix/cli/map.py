@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from firstfix.cli.map_changes import changes
 from firstfix.cli.progress import progress
 from firstfix.core.errors import MapError
 from firstfix.core.scan import MAX_BEAMS
@@ -26,6 +27,7 @@ MOST_CELLS = 10_000_000
 MOST_PAIRS = 10
 
 map_app = typer.Typer(help="Look at a map.", no_args_is_help=True)
+map_app.command()(changes)
 
 PANEL = "Perceptual aliasing: which places look alike"
 MapPath = Annotated[Path, typer.Argument(metavar="MAP", help="YAML of a map_server map.")]

@@ -1,0 +1,1 @@
+"""What scans of a localized robot contradict in its map."""
