@@ -2,6 +2,8 @@
 #   docker build -f docker/ros1.Dockerfile -t firstfix:ros1 .
 #   docker run --rm --network host -e ROS_MASTER_URI -e ROS_IP firstfix:ros1 scan:=base_scan
 FROM debian:12-slim
+# The archive keeps only the newest version of a package: a pinned one could not be built later.
+# hadolint ignore=DL3008
 RUN apt-get update \
     && apt-get install -y --no-install-recommends \
        python3-venv python3-rospy python3-tf2-msgs python3-sensor-msgs python3-nav-msgs \

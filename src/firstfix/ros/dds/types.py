@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 import struct
 from typing import Any
 
@@ -14,7 +15,6 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from firstfix.core.errors import InputError
-from firstfix.ros.dds.domain import is_before_iron
 
 # Messages of packages outside the ROS core.
 _DEFINITIONS = {
@@ -34,7 +34,9 @@ _BASE = {"bool": bool, "byte": types.uint8, "char": types.uint8, "string": str}
 
 @functools.cache
 def _store() -> Typestore:
-    store = get_typestore(Stores.ROS2_HUMBLE if is_before_iron() else Stores.ROS2_IRON)
+    distribution = os.environ.get("ROS_DISTRO", "").upper()
+    # Since Iron, the types of the node are the same in all distributions.
+    store = get_typestore(getattr(Stores, f"ROS2_{distribution}", Stores.ROS2_IRON))
     for name, text in _DEFINITIONS.items():
         store.register(get_types_from_msg(text, name))
     return store
