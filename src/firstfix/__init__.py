@@ -45,8 +45,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-__all__ = [
-    "SE2",
+__all__ = [  # noqa: RUF022 - in plain alphabetical order
     "All",
     "AmclConfig",
     "AnyOf",
@@ -81,6 +80,7 @@ __all__ = [
     "Recording",
     "Region",
     "Reset",
+    "SE2",
     "ScanError",
     "ScanMatcher",
     "SearchReport",
