@@ -81,6 +81,19 @@ def test_a_robot_is_found_and_leaves(broker, listen, robot):
         assert all(a < b for a, b in itertools.pairwise(ids))
 
 
+def test_each_end_is_reported(broker, listen, robot):
+    """Also one at the moment of a message, when a wait that is cancelled may go on."""
+    fleet = listen(broker)
+    robot.begin()
+    for number in range(10):
+        with bridged(robot, broker.url) as (_, log):
+            wait(lambda log=log: log)
+            for _ in range(number):
+                robot.scan()
+        wait(lambda number=number: len(fleet.of("connection")) == 2 * number + 2)
+    assert {c["connectionState"] for c in fleet.of("connection")[1::2]} == {"OFFLINE"}
+
+
 def test_version_3_has_its_own_topics(broker, listen, robot):
     fleet = listen(broker, "vda5050/v3/ACME/0001")
     with bridged(robot, broker.url, Version.V3):

@@ -152,6 +152,7 @@ class Actions:
     def _begin(self, action: Action) -> list[Input]:
         if action.action_id in self._reports:
             return []  # sent again
+        self._drop_old()
         self._reports[action.action_id] = ActionReport(
             action.action_id, action.action_type, ActionStatus.RUNNING
         )
@@ -174,7 +175,6 @@ class Actions:
             self.errors = (*self.errors, error)[-_MOST_REPORTS:]
             return []
         self.errors = ()
-        self._drop_old()
         return inputs
 
     # ---- one kind of action each
@@ -267,8 +267,9 @@ class Actions:
         self._check = None
 
     def _drop_old(self) -> None:
+        """Make room for one report."""
         ended = [r.id for r in self.reports if r.status is not ActionStatus.RUNNING]
-        for action_id in ended[: max(0, len(self._reports) - _MOST_REPORTS)]:
+        for action_id in ended[: max(0, len(self._reports) + 1 - _MOST_REPORTS)]:
             del self._reports[action_id]
 
 

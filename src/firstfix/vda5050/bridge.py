@@ -82,6 +82,7 @@ class Bridge:
         self._task: asyncio.Task[None] | None = None
         self._news = asyncio.Event()
         self._has_moved = False
+        self._is_ending = False
         self._has_begun = threading.Event()
         self._thread = threading.Thread(target=self._run, name="vda5050", daemon=True)
 
@@ -91,8 +92,7 @@ class Bridge:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._task is not None:
-            self._call(self._task.cancel)
+        self._call(self._end)
         self._thread.join(_END_S)
 
     def attach(self, give: Callable[[Input], None]) -> None:
@@ -121,6 +121,12 @@ class Bridge:
 
     # ---- the thread of the bridge
 
+    def _end(self) -> None:
+        self._is_ending = True
+        self._news.set()
+        if self._task is not None:
+            self._task.cancel()
+
     def _run(self) -> None:
         with contextlib.suppress(asyncio.CancelledError):
             asyncio.run(self._stay_connected())
@@ -129,7 +135,7 @@ class Bridge:
         self._loop, self._task = asyncio.get_running_loop(), asyncio.current_task()
         self._has_begun.set()
         pause_s = _FIRST_PAUSE_S
-        while True:
+        while not self._is_ending:
             began = time.monotonic()
             try:
                 async with self._client() as client:
@@ -165,10 +171,10 @@ class Bridge:
         await client.subscribe(self._identity.topic("instantActions"), qos=0)
         try:
             await _first_to_end(self._listen(client), self._speak(client))
-        except asyncio.CancelledError:
-            with contextlib.suppress(aiomqtt.MqttError):
-                await self._publish_connection(client, "OFFLINE")
-            raise
+        finally:
+            if self._is_ending:
+                with contextlib.suppress(aiomqtt.MqttError):
+                    await self._publish_connection(client, "OFFLINE")
 
     async def _publish_connection(self, client: aiomqtt.Client, state: str) -> None:
         message = self._encoder.connection(state, _now())
@@ -198,9 +204,10 @@ class Bridge:
         shown_at = stated_at = -_STATE_S
         has_moved = False
         self._news.set()
-        while True:
-            with contextlib.suppress(asyncio.TimeoutError):
-                await asyncio.wait_for(self._news.wait(), _STATE_S)
+        while not self._is_ending:  # a client's wait may swallow that it is cancelled
+            timer = asyncio.get_running_loop().call_later(_STATE_S, self._news.set)
+            await self._news.wait()
+            timer.cancel()
             self._news.clear()
             report, moved_since = self._take_report()
             has_moved = has_moved or moved_since

@@ -107,13 +107,21 @@ def _password() -> str | None:
     name = os.environ.get(PASSWORD_FILE)
     if name is None:
         return os.environ.get(PASSWORD)
+    received = ""
     try:
         with Path(name).open("rb") as file:
-            password = file.read(_LONGEST_PASSWORD + 1).decode().rstrip("\r\n")
-    except (OSError, UnicodeError) as error:
+            content = file.read(_LONGEST_PASSWORD + 1)
+        password = content.decode().rstrip("\r\n")
+        if not password or len(content) > _LONGEST_PASSWORD:
+            received = f"{len(content)} bytes"
+    except OSError as error:
+        password, received = "", f"{error.strerror}"
+    except UnicodeError:
+        password, received = "", "not UTF-8 text"
+    if received:
         raise InputError(
             expected=f"a file with a password in {PASSWORD_FILE}",
-            received=f"{name}: {getattr(error, 'strerror', None) or 'not UTF-8 text'}",
+            received=f"{name}: {received}",
             remedy="correct the variable or the file",
-        ) from error
+        )
     return password

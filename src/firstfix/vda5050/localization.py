@@ -125,10 +125,10 @@ class Localization:
         return 0.0
 
     def _deviation(self) -> float | None:
-        if self._covariance is None:
-            return None
+        if self._covariance is None or not np.isfinite(self._covariance).all():
+            return None  # JSON has no other numbers
         variance = float(np.linalg.eigvalsh(self._covariance[:2, :2])[-1])
-        return _RADIUS_95 * math.sqrt(variance) if 0.0 <= variance < math.inf else None
+        return _RADIUS_95 * math.sqrt(max(0.0, variance))
 
     def _add(self, given: Odometry) -> None:
         if self._odometry and given.stamp <= self._odometry[-1].stamp:
