@@ -41,7 +41,7 @@ def save_rooms(folder: Path) -> Path:
     return folder
 
 
-def scan_in(room: str, pose: SE2, seed: int = 0, stamp: float = 0.0) -> LaserScan:
-    """Simulate a scan of the whole turn."""
-    lidar = Lidar(beams=360, range_max=12.0)
+def scan_in(room: str, pose: SE2, seed: int = 0, stamp: float = 0.0, **sensor: float) -> LaserScan:
+    """Simulate a scan, of the whole turn unless the sensor is another."""
+    lidar = Lidar(**{"beams": 360, "range_max": 12.0, **sensor})
     return lidar.scan(draw(ROOMS[room]), pose, np.random.default_rng(seed), stamp=stamp)

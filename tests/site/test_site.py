@@ -9,6 +9,7 @@ from typing import TypeVar
 import pytest
 from site_lab import ROOMS, draw, save_rooms, scan_in
 
+from firstfix.belief.prior import Near
 from firstfix.core.errors import InputError
 from firstfix.core.estimate import Verdict
 from firstfix.core.se2 import SE2
@@ -125,3 +126,68 @@ def test_a_damaged_file_is_built_again(folder: Path, tmp_path: Path) -> None:
         file.write_bytes(file.read_bytes()[:-9])
     result = Site.load(folder, tmp_path).locate(scan_in("first", POSE))
     assert (result.verdict, result.map_id) == (Verdict.UNIQUE, "first")
+
+
+def test_an_edited_copy_shows_the_same_around_the_place(tmp_path: Path) -> None:
+    save_rooms(tmp_path)
+    edited = [*ROOMS["ground"], (2.0, 5.9, 2.3, 6.0)]
+    save_map(draw(edited), tmp_path / "edited.yaml")
+    result = Site.load(tmp_path).locate(scan_in("ground", POSE))
+    assert result.verdict is Verdict.UNIQUE
+    assert {result.map_id, result.same_places[0][0].map_id} == {"edited", "ground"}
+
+
+def test_maps_that_overlap_in_the_site_are_no_rivals(tmp_path: Path) -> None:
+    save_rooms(tmp_path)
+    # The same hall with much furniture of its own, turned by a right angle.
+    (tmp_path / "site.yaml").write_text(
+        "maps:\n  a: {map: ground, pose: [0, 0, 0]}\n  b: {map: ground, pose: [0, 0, 1.57]}\n"
+    )
+    result = Site.load(tmp_path).locate(scan_in("ground", POSE))
+    assert result.verdict is Verdict.AMBIGUOUS  # the poses say that these are two halls
+    (tmp_path / "site.yaml").write_text(
+        "maps:\n  a: {map: ground, pose: [5, 0, 0]}\n  b: {map: ground, pose: [5, 0, 0]}\n"
+    )
+    assert Site.load(tmp_path).locate(scan_in("ground", POSE)).verdict is Verdict.UNIQUE
+
+
+NARROW = {"beams": 61, "fov": 1.2, "range_max": 4.0, "sigma_m": 0.01}
+
+
+def test_one_scan_of_a_sensor_that_sees_little_is_never_enough(site: Site) -> None:
+    starts = [POSE, SE2(3.9, 1.7, 1.4), SE2(3.9, 1.7, 2.2)]
+    scans = [scan_in("second", pose, i, float(i), **NARROW) for i, pose in enumerate(starts)]
+    one = site.locate(scans[0])
+    assert one.verdict is not Verdict.UNIQUE
+    several = site.locate(scans, [POSE.inverse() @ pose for pose in starts])
+    assert (several.verdict, several.map_id) == (Verdict.UNIQUE, "second"), several.reason
+
+
+def test_a_prior_names_the_map_and_is_overruled_by_the_scan(site: Site) -> None:
+    scan = scan_in("ground", POSE)
+    right = site.locate(scan, prior={"ground": Near(POSE, 1.0), "first": None})
+    assert (right.verdict, right.map_id) == (Verdict.UNIQUE, "ground")
+    wrong = site.locate(scan, prior={"first": None})
+    assert wrong.verdict is not Verdict.UNIQUE or wrong.map_id == "ground"
+    with pytest.raises(InputError, match="names maps"):
+        site.locate(scan, prior=Near(POSE, 1.0))  # type: ignore[arg-type]
+
+
+def test_too_few_hits_match_nothing(site: Site) -> None:
+    blocked = scan_in("ground", POSE, range_max=0.2)
+    result = site.locate(blocked)
+    assert (result.verdict, result.hypotheses) == (Verdict.NO_MATCH, ())
+    assert "too few beams" in str(result)
+    assert result.to_dict()["pose"] is None
+    twice = site.locate([blocked, scan_in("ground", POSE, range_max=0.2, stamp=1.0)])
+    assert twice.verdict is Verdict.NO_MATCH
+
+
+def test_a_site_without_a_usable_map_says_so(tmp_path: Path) -> None:
+    save_rooms(tmp_path)
+    for room in ROOMS:
+        (tmp_path / room / "map.pgm").unlink()
+    result = Site.load(tmp_path).locate(scan_in("ground", POSE))
+    assert result.verdict is Verdict.NO_MATCH
+    assert "no map of the site" in result.reason
+    assert len(result.faults) == len(ROOMS)

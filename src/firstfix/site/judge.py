@@ -8,17 +8,45 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from firstfix.belief.config import BeliefConfig
+from firstfix.belief.judge import (
+    ALONE_PROBABILITY,
+    EXPLAINED_COST,
+    SECOND_LOOK_M,
+    SECOND_LOOK_RAD,
+)
 from firstfix.core.estimate import Verdict
+from firstfix.core.scan import LaserScan
 from firstfix.global_localization.places import is_same_place
-from firstfix.global_localization.sensors import see_enough
-from firstfix.global_localization.verdict import judge
+from firstfix.global_localization.prior import NEAR_LOG
+from firstfix.global_localization.sensors import joint_beams, see_enough
+from firstfix.global_localization.verdict import RIVAL_SHARE, judge, place_probabilities
 from firstfix.site.look import Looked
 from firstfix.site.places import SiteCandidates, SitePlace
 from firstfix.site.query import SiteQuery
 from firstfix.site.result import SiteResult
+from firstfix.site.surroundings import show_the_same
+from firstfix.site.views import has_moved, views_of
 
+# Least probability for UNIQUE: of one look as in `LocateConfig`, of several views as in the belief.
 UNIQUE_PROBABILITY = 0.95
+SURE_PROBABILITY = BeliefConfig().sure_probability
+
 LISTED_PLACES = 24
+
+_NOTHING = (
+    "too few beams measured a surface: blocked sensor, open space, or limits range_min and "
+    "range_max that do not fit it"
+)
+_NO_MAP = "no map of the site can be searched"
+_SEES_TOO_LITTLE = (
+    "but one scan of a sensor with this field of view and range is not enough to be sure: "
+    "drive half a metre or turn, and give several scans"
+)
+_SEEN_ONCE = (
+    f"but this sensor needs a second view to be sure: drive {SECOND_LOOK_M} m or turn "
+    f"{np.degrees(SECOND_LOOK_RAD):.0f}°"
+)
 
 
 def judge_site(
@@ -45,40 +73,109 @@ def judge_site(
         (place for part in found for place in part.places),
         key=lambda place: (-place.log_posterior, place.map_id),
     )
-    places, others = _without_copies(ranked)
+    places, copies = _without_copies(ranked)
     if not places:
-        return _nothing(query, seen, found)
-    shares = seen.recall * _shares(places)
-    hypotheses = tuple(
+        searched = any(part.searched for part in found)
+        return _result(query, seen, found, Verdict.NO_MATCH, _NOTHING if searched else _NO_MAP)
+    shares = seen.recall * _shares(places, copies, found)
+    hypotheses = [
         replace(place.hypothesis, probability=float(share))
-        for place, share in zip(places, shares, strict=True)
-    )
-    verdict, reason = judge(shares, hypotheses[0].evidence, UNIQUE_PROBABILITY)
-    if verdict is Verdict.UNIQUE and query.is_one_look and not see_enough(query.scans):
-        verdict, reason = Verdict.AMBIGUOUS, f"{reason}, but one scan of this sensor is not enough"
-    of_maps: dict[str, float] = dict.fromkeys(seen.map_ids, 0.0)
-    for hypothesis in hypotheses:
-        of_maps[hypothesis.map_id or ""] += hypothesis.probability
-    return SiteResult(
-        verdict=verdict,
-        reason=reason,
-        hypotheses=hypotheses[:LISTED_PLACES],
-        same_places=others,
-        map_probabilities=of_maps,
-        elsewhere=max(0.0, 1.0 - float(shares.sum())),
-        searched=tuple(name for part in found for name in part.searched),
-        faults=tuple(fault for part in found for fault in part.faults),
-        elapsed_s=0.0,
-        scans=query.scans,
+        for place, share in zip(places, shares[:, -1], strict=True)
+    ]
+    if query.is_one_look:
+        verdict, reason = _judge_look(query, places, shares[:, -1])
+    else:
+        verdict, reason = _judge_views(query, places, shares)
+    if verdict is Verdict.UNIQUE:
+        verdict, reason = _checked_against_prior(places, reason)
+    return replace(
+        _result(query, seen, found, verdict, reason),
+        hypotheses=tuple(hypotheses[:LISTED_PLACES]),
+        same_places=copies,
+        map_probabilities={
+            name: sum(h.probability for h in hypotheses if h.map_id == name)
+            for name in seen.map_ids
+        },
+        elsewhere=max(0.0, 1.0 - float(shares[:, -1].sum())),
     )
 
 
-def _shares(places: Sequence[SitePlace]) -> NDArray[np.float64]:
-    """Return the probability of each place against all others and a wrong map."""
-    logs = np.array([0.0, *(place.log_posterior for place in places)])
-    likelihoods = np.exp(logs - logs.max())
-    shares: NDArray[np.float64] = likelihoods[1:] / likelihoods.sum()
+def _shares(
+    places: Sequence[SitePlace],
+    copies: dict[int, list[SitePlace]],
+    found: Sequence[SiteCandidates],
+) -> NDArray[np.float64]:
+    """Return the probability of each place after each view, shape (n, steps).
+
+    Against all other places of all maps, listed or not, and a wrong map. A copy is no other place.
+    """
+    logs = np.array([place.steps for place in places])
+    totals = np.array([part.totals for part in found if len(part.totals)])
+    most = np.maximum(0.0, np.maximum(logs.max(axis=0), totals.max(axis=0)))
+    mass = np.exp(-most) + np.exp(totals - most).sum(axis=0)
+    for others in copies.values():
+        mass -= np.exp(np.array([other.steps for other in others]) - most).sum(axis=0)
+    likelihoods = np.exp(logs - most)
+    # Where nearly all was copies, what is left of the mass is rounding.
+    shares: NDArray[np.float64] = likelihoods / np.maximum(mass, likelihoods.sum(axis=0))
     return shares
+
+
+def _judge_look(
+    query: SiteQuery, places: Sequence[SitePlace], shares: NDArray[np.float64]
+) -> tuple[Verdict, str]:
+    verdict, reason = judge(shares, places[0].hypothesis.evidence, UNIQUE_PROBABILITY)
+    is_enough = see_enough(query.scans) or _is_hinted(query, places[0])
+    if verdict is Verdict.UNIQUE and not is_enough:
+        return Verdict.AMBIGUOUS, f"{reason}, {_SEES_TOO_LITTLE}"
+    return verdict, reason
+
+
+def _judge_views(
+    query: SiteQuery, places: Sequence[SitePlace], shares: NDArray[np.float64]
+) -> tuple[Verdict, str]:
+    """Decide by the rule of the belief: sure in two views from different poses."""
+    views, best, now = views_of(query), shares[0], shares[:, -1]
+    if now.sum() < 0.5:
+        return Verdict.NO_MATCH, f"no place of any map explains the {len(views)} views"
+    if places[0].cost > EXPLAINED_COST:
+        return Verdict.AMBIGUOUS, "the most likely place does not explain the latest view"
+    if best[-1] < SURE_PROBABILITY:
+        rivals = int(np.count_nonzero(now >= RIVAL_SHARE * now[0]))
+        return Verdict.AMBIGUOUS, f"{rivals} places explain the views about as well"
+    unsure = np.flatnonzero(best < SURE_PROBABILITY)
+    since = views[int(unsure[-1]) + 1 if len(unsure) else 0]
+    if (
+        has_moved(since, views[-1], SECOND_LOOK_M, SECOND_LOOK_RAD)
+        or _is_hinted(query, places[0])
+        or _decides_alone(views[-1].scans, places)
+    ):
+        return Verdict.UNIQUE, f"{len(views)} views fit here and nowhere else nearly as well"
+    return Verdict.AMBIGUOUS, f"one place has {best[-1]:.0%} of the probability, {_SEEN_ONCE}"
+
+
+def _decides_alone(scans: Sequence[LaserScan], places: Sequence[SitePlace]) -> bool:
+    """Tell whether the newest view of a sensor that sees much is enough."""
+    costs = np.array([place.cost for place in places])
+    alone = place_probabilities(costs, len(joint_beams(scans)[1]))
+    return see_enough(scans) and bool(alone[0] >= ALONE_PROBABILITY)
+
+
+def _is_hinted(query: SiteQuery, place: SitePlace) -> bool:
+    """Tell whether a prior of the pose, not only of the map, speaks for a place."""
+    return query.prior_in(place.map_id) is not None and place.prior_log >= NEAR_LOG
+
+
+def _checked_against_prior(places: Sequence[SitePlace], reason: str) -> tuple[Verdict, str]:
+    """Let nothing decide where the scans clearly fit better outside the prior."""
+    favourite = max(places, key=lambda place: place.log_likelihood)
+    ratio = np.exp(places[0].log_likelihood - favourite.log_likelihood)
+    if ratio >= RIVAL_SHARE:
+        return Verdict.UNIQUE, reason
+    return (
+        Verdict.AMBIGUOUS,
+        f"the scan fits {1.0 / ratio:.0f} times better in {favourite.map_id} than near the prior",
+    )
 
 
 def _without_copies(
@@ -86,24 +183,26 @@ def _without_copies(
 ) -> tuple[list[SitePlace], dict[int, list[SitePlace]]]:
     """Keep the best of places that are one; return the others by its rank."""
     kept: list[SitePlace] = []
-    others: dict[int, list[SitePlace]] = {}
+    copies: dict[int, list[SitePlace]] = {}
     for place in ranked:
         for rank, better in enumerate(kept):
             if are_one_place(better, place):
-                others.setdefault(rank, []).append(place)
+                copies.setdefault(rank, []).append(place)
                 break
         else:
             kept.append(place)
-    return kept, others
+    return kept, copies
 
 
 def are_one_place(a: SitePlace, b: SitePlace) -> bool:
-    """Tell whether two places of different maps are the same one in the world."""
+    """Tell whether places of two maps are one in the world."""
     if a.map_id == b.map_id or _apart(a, b):
         return False
     if a.T_site_base is not None and b.T_site_base is not None:
         return is_same_place(a.T_site_base, b.T_site_base)
-    return a.content == b.content and is_same_place(a.hypothesis.pose, b.hypothesis.pose)
+    if a.content == b.content:
+        return is_same_place(a.hypothesis.pose, b.hypothesis.pose)
+    return a.around is not None and b.around is not None and show_the_same(a.around, b.around)
 
 
 def _apart(a: SitePlace, b: SitePlace) -> bool:
@@ -114,10 +213,17 @@ def _apart(a: SitePlace, b: SitePlace) -> bool:
     )
 
 
-def _nothing(query: SiteQuery, seen: Looked, found: Sequence[SiteCandidates]) -> SiteResult:
+def _result(
+    query: SiteQuery,
+    seen: Looked,
+    found: Sequence[SiteCandidates],
+    verdict: Verdict,
+    reason: str,
+) -> SiteResult:
+    """Return a result without places."""
     return SiteResult(
-        verdict=Verdict.NO_MATCH,
-        reason="the scan has too few beams that measured a surface, or no map could be searched",
+        verdict=verdict,
+        reason=reason,
         hypotheses=(),
         same_places={},
         map_probabilities=dict.fromkeys(seen.map_ids, 0.0),

@@ -32,7 +32,7 @@ class PreparedMap:
     fields : MapFields
         The map.
     content : str
-        Hash of cells and resolution: maps that are copies have the same.
+        Hash of cells, resolution and origin: maps that are copies have the same.
     """
 
     entry: SiteMap
@@ -114,7 +114,9 @@ def prepared(entry: SiteMap, cache_dir: Path | None) -> PreparedMap:
     grid = _grid_of(layers, header)
     fields = MapFields(grid, cache_dir, key, cache_limit=None)
     check_positions(fields)
-    return PreparedMap(entry, fields, cache.content_key(grid.cells, repr(grid.resolution)))
+    return PreparedMap(
+        entry, fields, cache.content_key(grid.cells, repr((grid.resolution, *grid.T_map_grid)))
+    )
 
 
 def _layers(path: Path) -> NDArray[np.int8]:

@@ -73,7 +73,9 @@ class _Pool:
         return self.take(kept)
 
 
-def search_one_look(query: SiteQuery, map_ids: Sequence[str], maps: Maps) -> tuple[SitePlace, ...]:
+def search_one_look(
+    query: SiteQuery, map_ids: Sequence[str], maps: Maps
+) -> tuple[tuple[SitePlace, ...], NDArray[np.float64]]:
     """Search several maps for one scan of each sensor.
 
     Parameters
@@ -87,22 +89,25 @@ def search_one_look(query: SiteQuery, map_ids: Sequence[str], maps: Maps) -> tup
 
     Returns
     -------
-    tuple of SitePlace
+    places : tuple of SitePlace
         The best of all maps; none if the scan has too few hits.
+    totals : ndarray, shape (1,)
+        Logarithm of the likelihood of all of them.
     """
     scan, beams = joint_beams(query.scans)
     if int(np.count_nonzero(beams.hit)) < FEWEST_HITS:
-        return ()
+        return (), np.array([-np.inf])
     pool = _searched(query, map_ids, maps, scan, beams)
     pool = _refined(pool, map_ids, maps, beams)
     pool = _distinct(pool, map_ids, maps, len(beams), CAREFUL_PLACES)
     pool = _compared(pool, map_ids, maps, beams)
     pool = _distinct(pool, map_ids, maps, len(beams), LISTED_PLACES)
-    return tuple(
+    places = [
         place
         for i, here in pool.by_map()
         for place in _described(query, maps(map_ids[i]), scan, beams, pool.poses[here])
-    )
+    ]
+    return tuple(places), np.array([np.logaddexp.reduce([p.log_posterior for p in places])])
 
 
 def _searched(
@@ -188,7 +193,8 @@ def _described(
             prepared,
             float(logs[i] - logs[-1]),
             float(before[i]),
-            (float(costs[i]),),
+            (float(logs[i] - logs[-1] + before[i]),),
+            float(costs[i]),
         )
         for i in distinct_places(poses, costs, fields.grid.resolution, LISTED_PLACES).tolist()
     ]
@@ -209,7 +215,8 @@ def as_place(
     prepared: PreparedMap,
     log_likelihood: float,
     prior_log: float,
-    costs: tuple[float, ...],
+    steps: tuple[float, ...],
+    cost: float,
 ) -> SitePlace:
     """Return a place of a map with what the verdict needs to know of the map."""
     entry, pose = prepared.entry, hypothesis.pose
@@ -217,7 +224,8 @@ def as_place(
         hypothesis=replace(hypothesis, map_id=entry.id),
         log_likelihood=log_likelihood,
         prior_log=prior_log,
-        costs=costs,
+        steps=steps,
+        cost=cost,
         T_site_base=None if entry.T_site_map is None else entry.T_site_map @ pose,
         content=prepared.content,
         level=(entry.building, entry.floor),

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from firstfix.core.errors import FirstfixError, InputError
 from firstfix.core.grid import OccupancyGrid
@@ -18,14 +21,19 @@ from firstfix.io.maps.site_yaml import SiteDescription, SiteMap, Transition, rea
 from firstfix.site.judge import judge_site
 from firstfix.site.look import Looked, look_at_all
 from firstfix.site.maps import PreparedMaps
-from firstfix.site.places import SiteCandidates
+from firstfix.site.places import SiteCandidates, SitePlace
 from firstfix.site.query import SitePrior, SiteQuery
 from firstfix.site.result import SiteResult
 from firstfix.site.search import search_one_look
+from firstfix.site.surroundings import surroundings
 from firstfix.site.views import search_views
 
 MEMORY_LIMIT = 2 << 30
 """Default size of the prepared maps that are held at once, bytes."""
+
+# Places that may turn out to be one: only of these the surroundings are compared.
+LIKELY_PLACES = 6
+LIKELY_SHARE = 1e-3
 
 UNUSED_DAYS = 90.0
 """Files of prepared maps that no site has read for so long are removed."""
@@ -224,11 +232,32 @@ class Site:
         """
         usable = [name for name in map_ids if self._is_usable(self._entry(name))]
         search_maps = search_one_look if query.is_one_look else search_views
-        places = search_maps(query, usable, self._maps.get) if usable else ()
+        if not usable:
+            return SiteCandidates((), np.empty(0), (), self._faults_of(map_ids))
+        places, totals = search_maps(query, usable, self._maps.get)
         return SiteCandidates(
-            places,
+            self._with_surroundings(places),
+            totals,
             searched=tuple(usable),
-            faults=tuple(self._faults[name] for name in map_ids if name in self._faults),
+            faults=self._faults_of(map_ids),
+        )
+
+    def _faults_of(self, map_ids: Sequence[str]) -> tuple[str, ...]:
+        return tuple(self._faults[name] for name in map_ids if name in self._faults)
+
+    def _with_surroundings(self, places: Sequence[SitePlace]) -> tuple[SitePlace, ...]:
+        """Add to the likely places what their maps show around them."""
+        ranked = sorted(places, key=lambda place: -place.log_posterior)
+        least = ranked[0].log_posterior + math.log(LIKELY_SHARE) if ranked else 0.0
+        likely = [place for place in ranked[:LIKELY_PLACES] if place.log_posterior >= least]
+        return (
+            *(
+                replace(
+                    place, around=surroundings(self.fields(place.map_id), place.hypothesis.pose)
+                )
+                for place in likely
+            ),
+            *ranked[len(likely) :],
         )
 
     def _is_usable(self, entry: SiteMap) -> bool:
