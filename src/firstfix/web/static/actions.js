@@ -26,9 +26,10 @@ export class Actions {
    * @param {View} view
    * @param {Notices} notices
    * @param {() => void} onChange the map must be redrawn
+   * @param {() => void} onSend a command is about to be sent
    */
-  constructor(connection, scene, view, notices, onChange) {
-    Object.assign(this, { connection, scene, view, notices, onChange });
+  constructor(connection, scene, view, notices, onChange, onSend) {
+    Object.assign(this, { connection, scene, view, notices, onChange, onSend });
     for (const mode of Object.keys(MODES)) {
       byId(`mode-${mode}`).addEventListener("click", () => this.toggleMode(mode));
     }
@@ -135,7 +136,7 @@ export class Actions {
 
   togglePause() {
     if (!this.#abilities.has("pause")) return;
-    this.send({ type: "pause", paused: !this.scene.state?.paused });
+    this.send({ type: "pause", paused: !this.scene.live.state?.paused });
   }
 
   kidnap() {
@@ -155,6 +156,7 @@ export class Actions {
 
   /** Send a command; false if there is no connection, which is said. */
   send(message) {
+    this.onSend();
     const sent = this.connection.send(message);
     if (!sent) this.notices.showError("Not connected. Nothing was sent.");
     return sent;

@@ -4,6 +4,7 @@ const PAN_PX = 70;
 const NUDGE_PX = 8;
 const TURN = Math.PI / 36;
 const ZOOM = 1.3;
+const MAY_REPEAT = new Set([",", "."]);
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /**
@@ -48,7 +49,7 @@ function pressed({ view, scene, actions, commands, onViewed, onDraft }, event) {
     return true;
   }
   const command = commands[key === " " ? "Space" : key.toLowerCase()];
-  if (!command || event.repeat) return false;
+  if (!command || (event.repeat && !MAY_REPEAT.has(key))) return false;
   command();
   return true;
 }

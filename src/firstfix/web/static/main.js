@@ -8,6 +8,7 @@ import { listenToKeys } from "./keyboard.js";
 import { boundsOf } from "./layers/map.js";
 import { Notices } from "./notices.js";
 import { Panel } from "./panel.js";
+import { Past } from "./past.js";
 import { Scene } from "./scene.js";
 import { Sheet } from "./sheet.js";
 import { Renderer } from "./renderer.js";
@@ -36,7 +37,8 @@ const connection = new Connection({
   onMessage: take,
   onFrame(frame) {
     scene.takeFrame(frame);
-    redraw();
+    past.attach(frame);
+    if (scene.isLive) redraw();
   },
   onLost(waitMs) {
     app.dataset.connected = "false";
@@ -44,7 +46,8 @@ const connection = new Connection({
   },
   onTokenAsked: askForToken,
 });
-const actions = new Actions(connection, scene, view, notices, redraw);
+const actions = new Actions(connection, scene, view, notices, redraw, () => past.goLive());
+const past = new Past({ onLook: look, onLive: () => look(scene.live) });
 const tour = new Tour((message) => actions.send(message));
 const panel = new Panel({
   onPick: (id) => actions.pick(id),
@@ -65,6 +68,7 @@ function greet(hello) {
   app.dataset.connected = "true";
   notices.hideLost();
   scene.clearRobot();
+  past.clear();
   timeline.replace(hello.events);
   actions.allow(hello);
   tour.greet(hello);
@@ -74,9 +78,23 @@ function greet(hello) {
 
 function takeState(state) {
   scene.takeState(state);
-  panel.show(state);
+  past.record(state, scene.live);
   actions.simulation.show(state);
   tour.show(state);
+  if (scene.isLive) showState(state);
+}
+
+/** Look at a frame: the robot as it is, or as it was. */
+function look(frame) {
+  scene.frame = frame;
+  app.dataset.time = scene.isLive ? "live" : "past";
+  panel.isLive = scene.isLive;
+  if (frame.state) showState(frame.state);
+  redraw();
+}
+
+function showState(state) {
+  panel.show(state);
   byId("decide").hidden = !state.motion || !actions.canDecide;
   app.dataset.pose = numbers(state.pose);
   app.dataset.truth = numbers(state.truth);
@@ -86,9 +104,9 @@ function takeState(state) {
 
 async function showMap(map) {
   panel.showMap(map);
-  if (scene.image && JSON.stringify(map) === JSON.stringify(scene.map)) return;
-  scene.map = map;
-  scene.image = null;
+  const { live } = scene;
+  if (live.image && JSON.stringify(map) === JSON.stringify(live.map)) return;
+  Object.assign(live, { map, image: null });
   view.bounds = boundsOf(map);
   renderer.resize(sheet.covered());
   camera.fit();
@@ -96,8 +114,8 @@ async function showMap(map) {
     notices.showError(`The image of the map could not be loaded: ${problem.message}.`);
     return null;
   });
-  if (scene.map !== map || !image) return; // another map was received meanwhile
-  scene.image = image;
+  if (live.map !== map || !image) return; // another map was received meanwhile
+  live.image = image;
   renderer.recolour();
   app.dataset.map = map.name;
   performance.mark("map-shown");
@@ -144,6 +162,13 @@ function numbers(values) {
 
 // ---- input
 
+/** Leave one thing: a mode, the past, or the tour. */
+function leave() {
+  if (scene.mode !== "look") actions.leaveMode();
+  else if (past.isLive) tour.leave();
+  else past.goLive();
+}
+
 new Gestures(byId("overlay"), view, scene, {
   onViewed: () => camera.movedByHand(),
   onHover: hover,
@@ -171,7 +196,9 @@ listenToKeys({
     r: () => actions.relocalize(),
     Space: () => actions.togglePause(),
     t: () => tour.toggle(),
-    escape: () => (scene.mode === "look" ? tour.leave() : actions.leaveMode()),
+    ",": () => past.step(-1),
+    ".": () => past.step(1),
+    escape: leave,
     "?": () => byId("help-dialog").showModal(),
   },
 });

@@ -17,6 +17,7 @@ export class Panel {
   #state = null;
   #timer = 0;
   #receivedAt = 0;
+  isLive = true; // false while a person looks at another moment
 
   /**
    * @param {object} on onPick(id), onHighlight(id), onNewState(text for a screen reader)
@@ -151,7 +152,7 @@ export class Panel {
 
   #showAge() {
     const age = performance.now() - this.#receivedAt;
-    const isStale = this.#state && !this.#state.paused && age > STALE_AFTER_MS;
+    const isStale = this.#state && this.isLive && !this.#state.paused && age > STALE_AFTER_MS;
     byId("stale").hidden = !isStale;
     if (isStale) setText(byId("stale"), `Nothing received for ${Math.floor(age / 1000)} s.`);
   }

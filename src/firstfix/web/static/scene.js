@@ -1,14 +1,18 @@
-/** Everything that the layers draw. */
+/** Everything that the layers draw: the robot as it is now, or another frame that a person looks at. */
 
 const TRAIL_STEP_M = 0.04;
 const TRAIL_POINTS = 3000;
 const JUMP_M = 0.6; // between two poses 50 ms apart: not driven, so the trail is broken
 
+/** What is known at one moment; map and image are null where they are those of the robot. */
+export function emptyFrame() {
+  return { state: null, scan: null, particles: null, heat: null, trail: [], map: null, image: null };
+}
+
 export class Scene {
   constructor() {
-    this.map = null; // as GET /v1/map
-    this.image = null; // ImageBitmap of the map
-    this.clearRobot();
+    this.live = emptyFrame(); // its map is as GET /v1/map, its image an ImageBitmap
+    this.frame = this.live;
     this.mode = "look";
     this.draft = null; // {kind, x, y, yaw}: the command that is being drawn
     this.goal = null; // [x, y] where the robot was last sent
@@ -16,12 +20,41 @@ export class Scene {
     this.shown = { belief: true, scan: true, particles: true, trail: true, truth: true };
   }
 
+  get isLive() {
+    return this.frame === this.live;
+  }
+
+  get map() {
+    return this.frame.map ?? this.live.map;
+  }
+
+  get image() {
+    return this.frame.map ? this.frame.image : this.live.image;
+  }
+
+  get state() {
+    return this.frame.state;
+  }
+
+  get scan() {
+    return this.frame.scan;
+  }
+
+  get particles() {
+    return this.frame.particles;
+  }
+
+  get heat() {
+    return this.frame.heat;
+  }
+
+  get trail() {
+    return this.frame.trail;
+  }
+
   clearRobot() {
-    this.state = null;
-    this.scan = null;
-    this.particles = null;
-    this.heat = null;
-    this.trail = [];
+    const { map, image } = this.live;
+    Object.assign(this.live, emptyFrame(), { map, image });
     this.goal = null;
     this.highlighted = null;
   }
@@ -33,33 +66,20 @@ export class Scene {
   }
 
   takeState(state) {
-    this.state = state;
-    if (state.pose) this.#leaveTrail(state.pose);
-    else this.#breakTrail();
-    if (!state.pose && !this.hypotheses.length) this.scan = null;
-    if (!state.pose) this.particles = null;
+    const { live } = this;
+    live.state = state;
+    if (state.pose) leaveTrail(live.trail, state.pose);
+    else breakTrail(live.trail);
+    const isOpen = state.state !== "LOCALIZED" && state.hypotheses.length > 0;
+    if (!state.pose && !isOpen) live.scan = null;
+    if (!state.pose) live.particles = null;
     this.#arrive(state);
   }
 
   takeFrame(frame) {
-    if (frame.kind === "scan") this.scan = frame;
-    else if (frame.kind === "belief") this.heat = frame.heat;
-    else this.particles = frame;
-  }
-
-  #leaveTrail([x, y]) {
-    const last = this.trail.at(-1);
-    if (last) {
-      const step = Math.hypot(x - last[0], y - last[1]);
-      if (step < TRAIL_STEP_M) return;
-      if (step > JUMP_M) this.trail.push(null);
-    }
-    this.trail.push([x, y]);
-    if (this.trail.length > TRAIL_POINTS) this.trail.splice(0, TRAIL_POINTS / 10);
-  }
-
-  #breakTrail() {
-    if (this.trail.at(-1)) this.trail.push(null);
+    if (frame.kind === "scan") this.live.scan = frame;
+    else if (frame.kind === "belief") this.live.heat = frame.heat;
+    else this.live.particles = frame;
   }
 
   #arrive(state) {
@@ -67,4 +87,20 @@ export class Scene {
     const at = state.pose;
     if (!at || Math.hypot(at[0] - this.goal[0], at[1] - this.goal[1]) < 0.25) this.goal = null;
   }
+}
+
+/** Add a pose to a trail, unless it is where the trail ends. */
+export function leaveTrail(trail, [x, y], jump = JUMP_M) {
+  const last = trail.at(-1);
+  if (last) {
+    const step = Math.hypot(x - last[0], y - last[1]);
+    if (step < TRAIL_STEP_M) return;
+    if (step > jump) trail.push(null);
+  }
+  trail.push([x, y]);
+  if (trail.length > TRAIL_POINTS) trail.splice(0, TRAIL_POINTS / 10);
+}
+
+export function breakTrail(trail) {
+  if (trail.at(-1)) trail.push(null);
 }
