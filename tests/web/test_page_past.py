@@ -85,8 +85,9 @@ def test_the_past_is_bounded(page: Visit) -> None:
     page.page.evaluate("""async () => {
         const { Past } = await import("/static/past.js");
         const past = new Past({ onLook() {}, onLive() {} });
+        const nothing = { scan: null, heat: null };
         for (let i = 0; i < 4000; i += 1) {
-            past.record({ stamp: 0.2 * i, state: "LIFTED", pose: null }, { scan: null, heat: null });
+            past.record({ stamp: 0.2 * i, state: "LIFTED", pose: null }, nothing);
         }
         document.title = document.getElementById("scrub").max;
     }""")
