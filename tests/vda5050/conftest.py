@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -47,10 +47,11 @@ def until(holds: Callable[[], Any], what: str) -> Any:
 class Mosquitto:
     """A broker; ``users`` have passwords, and without them anybody may connect."""
 
-    def __init__(self, folder: Path, users: dict[str, str]) -> None:
+    def __init__(self, folder: Path, users: dict[str, str], lines: Sequence[str]) -> None:
         with socket.create_server(("127.0.0.1", 0)) as free:
             self.port = free.getsockname()[1]
-        lines = [f"listener {self.port} 127.0.0.1", f"allow_anonymous {str(not users).lower()}"]
+        anonymous = f"allow_anonymous {str(not users).lower()}"
+        lines = [f"listener {self.port} 127.0.0.1", anonymous, *lines]
         if users:
             passwords = folder / "passwords"
             passwords.touch(0o600)
@@ -106,8 +107,8 @@ def make_broker(mqtt: None, tmp_path: Path) -> Iterator[Callable[..., Mosquitto]
         missing("mqtt", "no mosquitto in PATH")
     started: list[Mosquitto] = []
 
-    def make(**users: str) -> Mosquitto:
-        started.append(Mosquitto(tmp_path, users))
+    def make(lines: Sequence[str] = (), **users: str) -> Mosquitto:
+        started.append(Mosquitto(tmp_path, users, lines))
         return started[-1]
 
     yield make

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
+import shutil
+import subprocess
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -165,6 +168,37 @@ def test_passwords(make_broker, robot, monkeypatch):
     with bridged(robot, url) as (_, log):
         wait(lambda: log)
     assert "connected" in log[0]
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_tls(make_broker, robot, tmp_path, monkeypatch):
+    """The certificate of the broker is verified, with the authorities in SSL_CERT_FILE."""
+    if shutil.which("openssl") is None:
+        pytest.skip("no openssl in PATH")
+    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
+    name = ["-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1"]
+    new = [
+        "openssl",
+        "req",
+        "-x509",
+        "-nodes",
+        "-newkey",
+        "ec",
+        "-pkeyopt",
+        "ec_paramgen_curve:P-256",
+    ]
+    files = ["-keyout", str(key), "-out", str(certificate)]
+    subprocess.run([*new, *files, *name], check=True, capture_output=True)
+    broker = make_broker([f"certfile {certificate}", f"keyfile {key}", "user root"])
+    url = broker.url.replace("mqtt:", "mqtts:")
+    with bridged(robot, url) as (_, log):
+        wait(lambda: log)
+    assert "certificate verify failed" in log[0].lower()
+    gc.collect()  # paho leaves the socket of a refused certificate to the collector
+    monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
+    with bridged(robot, url) as (_, log):
+        wait(lambda: log)
+    assert "connected to mqtts" in log[0]
 
 
 def action(fleet: Any, action_id: str, *ends: str) -> dict[str, Any]:

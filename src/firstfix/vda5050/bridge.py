@@ -25,9 +25,9 @@ from firstfix.vda5050.localization import Localization, is_driving
 from firstfix.vda5050.maps import MapRegister
 from firstfix.vda5050.report import Report
 
-# At most this often, s: the topic for people, and the state while nothing happens. The
-# specification asks for a state after each event, and at the latest after 30 s.
-_VISUALIZATION_S = 0.2
+# How often the bridge looks at the localizer, s: poses are published as often, and events at once.
+_PERIOD_S = 0.2
+# A state while nothing happens, s; the specification asks for one every 30 s at the latest.
 _STATE_S = 1.0
 # Between attempts to connect, s; doubled each time.
 _FIRST_PAUSE_S = 0.5
@@ -92,7 +92,9 @@ class Bridge:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._call(self._end)
+        if self._loop is not None:
+            with contextlib.suppress(RuntimeError):  # it has ended
+                self._loop.call_soon_threadsafe(self._end)
         self._thread.join(_END_S)
 
     def attach(self, give: Callable[[Input], None]) -> None:
@@ -110,14 +112,7 @@ class Bridge:
             self._actions.observe(given, outputs)
             self._localization.observe(given, outputs, now)
             self._has_moved |= any(isinstance(output, TrackedPose) for output in outputs)
-        if outputs:
-            self._call(self._news.set)
-
-    def _call(self, function: Callable[[], object]) -> None:
-        """Call a function in the thread of the bridge, unless that has ended."""
-        if self._loop is not None:
-            with contextlib.suppress(RuntimeError):
-                self._loop.call_soon_threadsafe(function)
+        # The bridge is not woken: it would compete with the localizer for the interpreter.
 
     # ---- the thread of the bridge
 
@@ -205,7 +200,7 @@ class Bridge:
         has_moved = False
         self._news.set()
         while not self._is_ending:  # a client's wait may swallow that it is cancelled
-            timer = asyncio.get_running_loop().call_later(_STATE_S, self._news.set)
+            timer = asyncio.get_running_loop().call_later(_PERIOD_S, self._news.set)
             await self._news.wait()
             timer.cancel()
             self._news.clear()
@@ -216,7 +211,7 @@ class Bridge:
                 message = self._encoder.state(report, _now())
                 await client.publish(self._identity.topic("state"), message, qos=0)
                 before, stated_at = events, now
-            if has_moved and now - shown_at >= _VISUALIZATION_S:
+            if has_moved and now - shown_at >= _PERIOD_S:
                 message = self._encoder.visualization(report, _now())
                 await client.publish(self._identity.topic("visualization"), message, qos=0)
                 shown_at, has_moved = now, False
