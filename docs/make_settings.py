@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
-from firstfix.ros.channels import PARTICLES, published_topics, subscribed_topics
+from firstfix.ros.channels import PARTICLES, published_topics, subscriptions
 from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.parameters import Parameter, parameters
 from firstfix.ros.services import WAIT, ros1_services, ros2_services
@@ -36,8 +37,9 @@ def page() -> str:
 def topics() -> str:
     """Return the table of topics between its marks in docs/ros.md."""
     full, bootstrap = NodeConfig(mode=Mode.FULL), NodeConfig()
+    sensors = replace(full, cloud_topics="points", depth_topics="depth/image_rect")
     published = [*published_topics(bootstrap, PARTICLES), *published_topics(full, PARTICLES)]
-    rows = [("in", topic) for topic in subscribed_topics(full).values()]
+    rows = [("in", topic) for _, topic in subscriptions(sensors)]
     rows += [("out", topic) for topic in dict.fromkeys(published)]
     lines = ["| | topic | type | delivery | content |\n|---|---|---|---|---|\n"]
     lines += [

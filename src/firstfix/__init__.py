@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from firstfix.amcl.config import AmclConfig, MotionModel, SensorModel
-    from firstfix.belief.prior import All, AnyOf, Near, Region
+    from firstfix.belief.prior import All, AnyOf, Gaussian, Near, Region
     from firstfix.changes.counts import ChangeCounter
     from firstfix.changes.survey import Change, MapChanges, find_changes
     from firstfix.core.deskew import deskew
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from firstfix.io.maps.map_server import load_map, save_map
     from firstfix.lab.scenarios.example_drive import simulate_drive
     from firstfix.lab.simulation.lidar import Lidar
-    from firstfix.localizer.config import LocalizerConfig, MonitorConfig
-    from firstfix.localizer.inputs import NewMap, NoMotionUpdate, PoseHint, Reset
+    from firstfix.localizer.config import LocalizerConfig, MonitorConfig, ScansConfig
+    from firstfix.localizer.inputs import NewMap, NoMotionUpdate, PoseHint, PositionFix, Reset
     from firstfix.localizer.localizer import Localizer
     from firstfix.localizer.outputs import (
         Hypotheses,
@@ -54,6 +54,7 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "Event",
     "Evidence",
     "FirstfixError",
+    "Gaussian",
     "Hypotheses",
     "Hypothesis",
     "InitialPose",
@@ -77,12 +78,14 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "OccupancyGrid",
     "Odometry",
     "PoseHint",
+    "PositionFix",
     "Recording",
     "Region",
     "Reset",
     "SE2",
     "ScanError",
     "ScanMatcher",
+    "ScansConfig",
     "SearchReport",
     "SensorModel",
     "Signal",
@@ -111,7 +114,7 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
 # A name is imported at its first use: numba alone takes longer than 0.3 s to import.
 _MODULES = {
     "amcl.config": ("AmclConfig", "MotionModel", "SensorModel"),
-    "belief.prior": ("All", "AnyOf", "Near", "Region"),
+    "belief.prior": ("All", "AnyOf", "Gaussian", "Near", "Region"),
     "changes.counts": ("ChangeCounter",),
     "changes.survey": ("Change", "MapChanges", "find_changes"),
     "core.deskew": ("deskew",),
@@ -132,8 +135,8 @@ _MODULES = {
     "io.maps.map_server": ("load_map", "save_map"),
     "lab.scenarios.example_drive": ("simulate_drive",),
     "lab.simulation.lidar": ("Lidar",),
-    "localizer.config": ("LocalizerConfig", "MonitorConfig"),
-    "localizer.inputs": ("NewMap", "NoMotionUpdate", "PoseHint", "Reset"),
+    "localizer.config": ("LocalizerConfig", "MonitorConfig", "ScansConfig"),
+    "localizer.inputs": ("NewMap", "NoMotionUpdate", "PoseHint", "PositionFix", "Reset"),
     "localizer.localizer": ("Localizer",),
     "localizer.outputs": ("Hypotheses", "InitialPose", "MotionRequest", "Status", "TrackedPose"),
     "localizer.precompile": ("precompile",),

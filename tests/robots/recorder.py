@@ -59,6 +59,27 @@ class Recorder:
         return [text for how, text in self.lines if how is severity]
 
 
+def point_cloud(make: Any, header: Any, xyz: Any, **changes: Any) -> Any:
+    """Build a ``sensor_msgs/PointCloud2`` of points, shape (n, 3); changes replace its fields."""
+    data = np.asarray(xyz, "<f4")
+    fields = [
+        make("sensor_msgs/PointField", name=name, offset=4 * i, datatype=7, count=1)
+        for i, name in enumerate("xyz")
+    ]
+    parts = {
+        "header": header,
+        "height": 1,
+        "width": len(data),
+        "fields": fields,
+        "is_bigendian": False,
+        "point_step": 12,
+        "row_step": 12 * len(data),
+        "data": np.frombuffer(data.tobytes(), np.uint8),
+        "is_dense": True,
+    }
+    return make("sensor_msgs/PointCloud2", **(parts | changes))
+
+
 class Speaker:
     """The messages of a robot that stands or drives in a drawn world."""
 

@@ -11,15 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recorder import Recorder, Speaker
+from recorder import Recorder, Speaker, point_cloud
 
 from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.io.maps.map_server import load_map, save_map
+from firstfix.io.maps.map_server import save_map
 from firstfix.lab.worlds.catalog import identical_rooms
-from firstfix.localizer.inputs import NewMap
-from firstfix.ros.channels import INITIAL_POSE, PARTICLES, Channel, subscribed_topics
+from firstfix.ros.channels import INITIAL_POSE, PARTICLES, Channel, subscriptions
 from firstfix.ros.node import Node
 from firstfix.ros.parameters import configured
 
@@ -45,6 +44,13 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "odom_frame_id": {"to": "wheels"},
     "global_frame_id": {"to": "floor"},
     "scan_topic": {"to": "base_scan"},
+    "scan_topics": {"to": "front/scan rear/scan"},
+    "cloud_topics": {"to": "points"},
+    "depth_topics": {"to": "depth/image"},
+    "height_band": {"to": "0.3 1.0", "in": "points", "with": {"cloud_topics": "points"}},
+    "laser_pose": {"to": "1.0,0.0,0.0"},
+    "laser_frame": {"to": "nowhere"},
+    "zones": {"to": "corner", "with": {"yaml_filename": "map.yaml"}},
     "map_topic": {"to": "floor_plan"},
     "first_map_only": {"to": True},
     "set_initial_pose": {"to": True},
@@ -90,6 +96,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "update_min_d": {"to": 2.0, "with": {"update_min_a": 3.0}},
     "update_min_a": {"to": 2.0, "with": {"update_min_d": 3.0}},
     "random_seed": {"to": 7},
+    "deskew": {"to": False, "in": "a slow laser"},
     "locate.max_poses": {"to": 1000},
     "locate.shortlist": {"to": 1},
     "locate.unique_probability": {"to": 1.0},
@@ -113,6 +120,15 @@ REFUSED = {"recovery_alpha_slow": 0.1, "recovery_alpha_fast": 0.1, "locate.hypot
 MOTION = SE2(0.3, 0.0, 0.1)
 
 
+def cloud_of(wire: Any, scan: Any) -> Any:
+    """Return the end points of a scan, at heights of 0.15 m and 0.5 m, as a point cloud."""
+    bearings = scan.angle_min + scan.angle_increment * np.arange(len(scan.ranges))
+    x, y = scan.ranges * np.cos(bearings), scan.ranges * np.sin(bearings)
+    low = np.column_stack([0.5 * x, 0.5 * y, np.full(len(x), 0.15)])
+    points = np.concatenate([low, np.column_stack([x, y, np.full(len(x), 0.5)])])
+    return wire.sent(point_cloud(wire.make, scan.header, points))
+
+
 class Drive:
     """A map, a robot that drives, slips and is carried away, and at last another map."""
 
@@ -126,6 +142,8 @@ class Drive:
         blinded: int = 0,
         scans: int = 20,
         reach: float = math.inf,
+        sweep_s: float = 0.0,
+        as_points: bool = False,
     ) -> None:
         self.wire, self.world = wire, world
         robot = Speaker(wire, world, start)
@@ -139,7 +157,8 @@ class Drive:
                 scan[1].ranges = np.where(scan[1].ranges > reach, np.inf, scan[1].ranges)
             if 0 <= i - 12 < blinded:  # it fits nowhere
                 scan[1].ranges = 2.0 + np.sin(np.arange(180.0) * i).astype(np.float32)
-            self.messages += [tf, scan]
+            scan[1].time_increment = sweep_s / 180
+            self.messages += [tf, (Channel.CLOUD, cloud_of(wire, scan[1])) if as_points else scan]
             robot.move(MOTION if i % 2 else SE2.identity(), 0.25)
         robot.world = OccupancyGrid(world.cells[:-10].copy(), world.resolution, world.T_map_grid)
         self.messages.append((Channel.MAP, robot.map()))
@@ -151,7 +170,7 @@ class Drive:
         recorder.listening = {PARTICLES.name: 1, INITIAL_POSE.name: 1}
         node = Node(config, recorder)
         if config.yaml_filename:
-            node._map = NewMap(0.0, load_map(folder / config.yaml_filename))
+            node._load_own_map()
         node._prepare()
         for channel, message in self.messages:
             node.receive(channel, message)
@@ -159,7 +178,7 @@ class Drive:
         node._scan_at -= 3.0  # s pass without a scan
         node._check_scans()
         node._memory.close()
-        topics = sorted(topic.name for topic in subscribed_topics(config).values())
+        topics = sorted(topic.name for _, topic in subscriptions(config))
         return [*topics, *map(str, recorder.published), *map(str, recorder.lines)]
 
 
@@ -173,6 +192,10 @@ def drives(ros2: Any, hall_plan: OccupancyGrid) -> dict[str, Drive]:
         ),
         "a short sensor": Drive(
             ros2, hall_plan, SE2(3.0, 2.5, 0.4), SE2(7.5, 5.0, -1.5), reach=4.0
+        ),
+        "points": Drive(ros2, hall_plan, SE2(3.0, 2.5, 0.4), SE2(7.5, 5.0, -1.5), as_points=True),
+        "a slow laser": Drive(
+            ros2, hall_plan, SE2(3.0, 2.5, 0.4), SE2(7.5, 5.0, -1.5), sweep_s=0.1
         ),
         "rooms": Drive(ros2, rooms, SE2(2.0, 2.0, 0.4), SE2(2.5, 2.5, 0.4)),
     }
@@ -199,6 +222,7 @@ def outcome(
     monkeypatch.setattr("firstfix.ros.node.time", SimpleNamespace(monotonic=lambda: 0.0))
     monkeypatch.chdir(tmp_path)
     save_map(OccupancyGrid(np.eye(50, dtype=np.int8) * 100, 0.05), tmp_path / "map.yaml")
+    (tmp_path / "map.zones.yaml").write_text("zones: {corner: [[0, 0], [1, 0], [1, 2]]}")
 
     saved: list[str] = []
     monkeypatch.setattr(

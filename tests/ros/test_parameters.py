@@ -16,7 +16,7 @@ from firstfix.core.se2 import SE2
 from firstfix.global_localization.config import LocateConfig
 from firstfix.io.parameters.amcl_yaml import IGNORED
 from firstfix.io.parameters.ros1_amcl import GONE, NEW_NAMES
-from firstfix.localizer.config import MonitorConfig
+from firstfix.localizer.config import MonitorConfig, ScansConfig
 from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.parameters import Parameter, configured, flattened, load_node_config, parameters
 
@@ -29,6 +29,7 @@ def test_every_setting_is_a_parameter_and_every_parameter_a_setting():
     expected |= {f"locate.{entry.name}" for entry in fields(LocateConfig)}
     expected |= {f"monitor.{entry.name}" for entry in fields(MonitorConfig)}
     expected |= {f"belief.{entry.name}" for entry in fields(BeliefConfig)}
+    expected |= {entry.name for entry in fields(ScansConfig)}
     expected -= {"localizer", "initial_pose"}
     expected |= {"initial_pose.x", "initial_pose.y", "initial_pose.yaw"}
     assert set(BY_NAME) == expected
@@ -63,12 +64,22 @@ def test_choices_are_listed():
     }
 
 
+# Texts that mean numbers, and one that needs a map file.
+TEXTS = {
+    "height_band": ("0.1 1.8", "0 2"),
+    "laser_pose": ("", "a=1,0,0 b=0,0,0,3.14"),
+    "zones": ("",),
+}
+
+
 def fitting(parameter: Parameter):
     if parameter.choices:
         return st.sampled_from(parameter.choices)
     kind = type(parameter.default)
     if kind is bool:
         return st.booleans()
+    if parameter.name in TEXTS:
+        return st.sampled_from(TEXTS[parameter.name])
     if kind is str:
         return st.text("abc/_", min_size=1).filter(lambda text: text != "/")
     low, high = max(parameter.least, -1e6), min(parameter.most, 1e6)
@@ -88,9 +99,10 @@ def test_valid_values_reach_the_config(data):
             got = getattr(config.initial_pose, short)
             assert math.isclose(math.cos(got), math.cos(value), abs_tol=1e-9)
             continue
-        owner = getattr(config.localizer, section or "amcl")
+        owner = getattr(config.localizer, section or ("scans" if name == "deskew" else "amcl"))
         got = getattr(config if hasattr(config, name) else owner, short)
-        expected = value.removeprefix("/") if name.endswith("_frame_id") else value
+        is_frame = name.endswith(("_frame_id", "_frame"))
+        expected = value.removeprefix("/") if is_frame else value
         assert (got.value if isinstance(got, Enum) else got) == expected
 
 
@@ -177,6 +189,12 @@ def test_the_error_of_a_misspelled_name_suggests_the_right_one():
         ("alpha1", math.nan, "a number"),
         ("scan_topic", "", "a text"),
         ("scan_topic", 5, "a text"),
+        ("height_band", "0.1", "two heights"),
+        ("height_band", [1.8, 0.1], "is empty"),
+        ("laser_pose", "1,2", "is not a pose"),
+        ("laser_pose", "0,0,0,1.57", "level"),
+        ("zones", "hall", "yaml_filename is empty"),
+        ("scan_topics", {"a": 1}, "a text"),
         ("base_frame_id", "/", "a text"),
         ("base_frame_id", 5, "a text"),
         ("initial_pose.x", "1", "initial_pose.x as a number"),

@@ -91,6 +91,67 @@ class Near:
             )
 
 
+# A measured pose is not better than the map, m and rad.
+_LEAST_SIGMA = np.array([0.15, 0.15, math.radians(5.0)])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Gaussian:
+    """A pose with a covariance, such as a fiducial gives, down to the floor.
+
+    Parameters
+    ----------
+    pose : SE2
+        ``T_map_base``. A tuple (x, y, yaw) in metres and radians is accepted.
+    covariance : ndarray, shape (3, 3)
+        Of x (m), y (m), yaw (rad) in the map frame. Standard deviations of less than 0.15 m and 5°
+        are enlarged to that: a map is not more precise.
+
+    Raises
+    ------
+    InputError
+        If this is no covariance.
+
+    Examples
+    --------
+    >>> seen = ff.Gaussian((2.0, 1.5, 0.0), np.diag([0.04, 0.04, 0.03]))
+    >>> seen.log_likelihood(np.array([[2.0, 1.5, 0.0], [2.4, 1.5, 0.0], [9.0, 1.5, 0.0]])).round(1)
+    array([-0. , -2. , -6.9])
+    """
+
+    pose: SE2
+    covariance: NDArray[np.float64]
+    _information: NDArray[np.float64] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        covariance = np.array(self.covariance, np.float64)
+        is_good = covariance.shape == (3, 3) and bool(np.isfinite(covariance).all())
+        if not is_good or np.linalg.eigvalsh(covariance + covariance.T).min() < -1e-9:
+            raise InputError(
+                "The covariance of a pose is a matrix of shape (3, 3) of x, y (m), yaw (rad), "
+                "finite and without negative variances. Check where the pose comes from."
+            )
+        missing = np.maximum(0.0, _LEAST_SIGMA**2 - np.diagonal(covariance))
+        covariance = 0.5 * (covariance + covariance.T) + np.diag(missing)
+        covariance.flags.writeable = False
+        object.__setattr__(self, "pose", as_pose(self.pose, "pose"))
+        object.__setattr__(self, "covariance", covariance)
+        object.__setattr__(self, "_information", np.linalg.inv(covariance))
+
+    def log_likelihood(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return log-likelihoods of poses in the map frame, shape (n,)."""
+        off = poses - self.pose.as_array()
+        off[:, 2] = np.remainder(off[:, 2] + math.pi, 2.0 * math.pi) - math.pi
+        logs = -0.5 * np.einsum("ij,jk,ik->i", off, self._information, off)
+        floored: NDArray[np.float64] = np.maximum(FLOOR, logs)
+        return floored
+
+    def check(self, grid: OccupancyGrid) -> None:
+        """Raise InputError if the pose is not on the map, or no free cell is within three sigma."""
+        sigma = math.sqrt(float(self.covariance.diagonal()[:2].max()))
+        Near(self.pose, max(1.0, 3.0 * sigma)).check(grid)
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Region:
     """Inside a polygon: 0 inside, falling within half a metre outside, down to the floor.

@@ -13,7 +13,14 @@ import typer
 
 from firstfix.cli.prior_options import NearPoses, Radius, RegionText, prior_of
 from firstfix.cli.progress import progress, working
-from firstfix.cli.sensor_options import BaseFrame, LaserFrame, LaserPose, Topics, read_log
+from firstfix.cli.sensor_options import (
+    BaseFrame,
+    HeightBand,
+    LaserFrame,
+    LaserPose,
+    Topics,
+    read_log,
+)
 from firstfix.core.errors import InputError, ScanError
 from firstfix.global_localization.config import Method
 
@@ -49,6 +56,7 @@ def locate(
     laser_pose: LaserPose = None,
     base_frame: BaseFrame = None,
     laser_frame: LaserFrame = None,
+    height_band: HeightBand = None,
     near: NearPoses = None,
     radius: Radius = None,
     region: RegionText = None,
@@ -70,7 +78,7 @@ def locate(
     # The scan of another sensor that is nearest in time may come later.
     several = topic is not None and len(topic) > 1
     limit = None if every or several else first + 1
-    recording = read_log(scans, topic, laser_pose, base_frame, laser_frame, limit)
+    recording = read_log(scans, topic, laser_pose, base_frame, laser_frame, limit, height_band)
     instants = recording.instants()
     chosen = range(len(instants)) if every else _only(len(instants), first)
     for note in recording.notes:

@@ -40,6 +40,16 @@ LaserFrame = Annotated[
     ),
 ]
 
+HeightBand = Annotated[
+    str | None,
+    typer.Option(
+        "--height-band",
+        metavar="LOW,HIGH",
+        help="Heights above the base of 3D points that are used, m.",
+        show_default="0.1,1.8",
+    ),
+]
+
 # As of a sensor in tf: a scan that is tilted more is no cut through the walls at one height.
 _MOST_TILT_RAD = math.radians(30.0)
 
@@ -51,8 +61,10 @@ def read_log(
     base_frame: str | None,
     laser_frame: str | None,
     max_scans: int | None = None,
+    height_band: str | None = None,
 ) -> Recording:
     """Read a recording under these options, and straighten its scans by its odometry."""
+    from firstfix.core.points import DEFAULT_BAND_M
     from firstfix.core.scan import Mounting
     from firstfix.io.logs.load import load_recording
 
@@ -65,8 +77,22 @@ def read_log(
         mounting=Mounting.UPSIDE_DOWN if is_upside_down else Mounting.UPRIGHT,
         base_frame=base_frame,
         laser_frame=laser_frame,
+        height_band=DEFAULT_BAND_M if height_band is None else _band(height_band),
     )
     return recording.deskewed()
+
+
+def _band(text: str) -> tuple[float, float]:
+    try:
+        low, high = (float(number) for number in text.split(","))
+    except ValueError:
+        low, high = math.nan, math.nan
+    if -math.inf < low < high < math.inf:
+        return low, high
+    raise InputError(
+        f"--height-band {text} is not a band. Write the lower and the higher height in metres, "
+        "such as 0.1,1.8."
+    )
 
 
 def _parsed(text: str) -> tuple[tuple[float, float, float], bool]:

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from firstfix.cli.progress import progress
-from firstfix.cli.sensor_options import BaseFrame, LaserFrame, LaserPose, Topics, read_log
+from firstfix.cli.sensor_options import (
+    BaseFrame,
+    HeightBand,
+    LaserFrame,
+    LaserPose,
+    Topics,
+    read_log,
+)
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -54,6 +61,7 @@ def track(
     laser_pose: LaserPose = None,
     base_frame: BaseFrame = None,
     laser_frame: LaserFrame = None,
+    height_band: HeightBand = None,
     keep_pose: Annotated[
         Path | None,
         typer.Option(
@@ -81,7 +89,7 @@ def track(
     from firstfix.io.maps.map_server import load_map
 
     grid = load_map(map_path)
-    recording = read_log(log, topic, laser_pose, base_frame, laser_frame)
+    recording = read_log(log, topic, laser_pose, base_frame, laser_frame, None, height_band)
 
     # Imported after the files are read, so that bad input is refused at once.
     from firstfix.lab.experiments.track_log import (

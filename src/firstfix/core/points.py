@@ -14,6 +14,9 @@ from firstfix.core.se2 import SE2
 STEP_RAD = math.radians(0.5)
 RANGE_MAX_M = 30.0
 
+DEFAULT_BAND_M = (0.1, 1.8)
+"""Heights of points that are compared with a map, m: above the floor, below most lamps."""
+
 # A nearer point is one of the robot itself, or noise.
 _RANGE_MIN_M = 0.05
 
@@ -24,7 +27,7 @@ _ROTATION_ERROR = 1e-3
 def scan_from_points(
     points: ArrayLike,
     T_base_sensor: ArrayLike,
-    band: tuple[float, float] = (0.1, 1.8),
+    band: tuple[float, float] = DEFAULT_BAND_M,
     *,
     view: tuple[float, float] = (-math.pi, math.pi),
     step: float = STEP_RAD,
@@ -73,7 +76,7 @@ def scan_from_points(
     xyz = np.asarray(points)
     if xyz.ndim < 2 or xyz.shape[-1] != 3 or xyz.dtype.kind not in "fiu":
         raise ScanError(f"Points have the shape (n, 3), not {xyz.shape}. Pass x, y, z in metres.")
-    T = _matrix(T_base_sensor)
+    T = pose_matrix(T_base_sensor)
     low, high = band
     if not low < high:
         raise ScanError(f"The band {low} to {high} m is empty. Give the lower height first.")
@@ -137,7 +140,8 @@ def points_from_depth(
     return np.stack([x, y, z], axis=-1)
 
 
-def _matrix(T_base_sensor: ArrayLike) -> NDArray[np.float64]:
+def pose_matrix(T_base_sensor: ArrayLike) -> NDArray[np.float64]:
+    """Return a pose in space as a matrix of shape (4, 4); see `scan_from_points`."""
     T = np.asarray(T_base_sensor, np.float64)
     if T.shape == (6,) and np.isfinite(T).all():
         return _from_roll_pitch_yaw(*T.tolist())

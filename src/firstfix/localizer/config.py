@@ -68,6 +68,30 @@ class MonitorConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class ScansConfig:
+    """What is done to scans before they are used.
+
+    Raises
+    ------
+    InputError
+        If a setting has the wrong type.
+
+    Examples
+    --------
+    >>> config = ff.LocalizerConfig(scans=ff.ScansConfig(deskew=False))
+    """
+
+    deskew: bool = setting(
+        True,
+        "straighten the scans of a moving robot by its odometry, where they have time_increment or "
+        "scan_time",
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+
+@dataclass(frozen=True, slots=True)
 class LocalizerConfig:
     """The settings of a `Localizer`.
 
@@ -81,6 +105,8 @@ class LocalizerConfig:
         Verification of the tracked pose.
     belief : BeliefConfig
         The choice between several places.
+    scans : ScansConfig
+        What is done to scans first.
 
     Examples
     --------
@@ -93,9 +119,11 @@ class LocalizerConfig:
     amcl: AmclConfig = field(default_factory=AmclConfig)
     monitor: MonitorConfig = field(default_factory=MonitorConfig)
     belief: BeliefConfig = field(default_factory=BeliefConfig)
+    scans: ScansConfig = field(default_factory=ScansConfig)
 
     def __post_init__(self) -> None:
         as_instance(LocateConfig, self.locate, "locate")
         as_instance(AmclConfig, self.amcl, "amcl")
         as_instance(MonitorConfig, self.monitor, "monitor")
         as_instance(BeliefConfig, self.belief, "belief")
+        as_instance(ScansConfig, self.scans, "scans")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,10 +10,6 @@ from firstfix.core.estimate import Hypothesis
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.places import SAME_PLACE_M, SAME_PLACE_RAD
 from firstfix.localizer.inputs import PoseHint
-
-# A person's click is good to about a metre and 40 degrees.
-_CLICK_M = 1.0
-_CLICK_RAD = math.radians(40.0)
 
 # Log-likelihood of the prior down to which a place counts as the hinted one.
 _MATCHING = -1.0
@@ -51,7 +46,7 @@ def read_hint(given: PoseHint, listed: Sequence[Hypothesis]) -> Hint | None:
         The places that can be named.
     """
     if given.hypothesis_id is None:
-        return Hint(given.source, Near(given.T_map_base, _CLICK_M, _CLICK_RAD))
+        return Hint(given.source, Near(given.T_map_base, given.radius, given.angle))
     named = next((place for place in listed if place.id == given.hypothesis_id), None)
     if named is None:
         return None

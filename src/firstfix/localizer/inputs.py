@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
 
 from firstfix.core.arguments import as_instance, as_pose
 from firstfix.core.errors import InputError
@@ -10,6 +14,7 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Odometry, Signal
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.global_localization.prior import Prior
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -52,6 +57,8 @@ class PoseHint:
         The pose.
     source : str
         Where it comes from, in the words that people will read.
+    radius, angle : float
+        How far the pose may be off, m and rad.
     hypothesis_id : int or None
         The place of the last `Hypotheses` that is meant. Its pose at present replaces
         `T_map_base`; if the place is no longer listed, the hint is refused.
@@ -66,6 +73,41 @@ class PoseHint:
     T_map_base: SE2
     source: str = "a person"
     hypothesis_id: int | None = None
+    radius: float = 1.0
+    angle: float = math.radians(40.0)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_map_base", as_pose(self.T_map_base, "T_map_base"))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PositionFix:
+    """A pose that something else has measured, such as a fiducial, a beacon or a dock.
+
+    It is a prior: it adds to what the scans say, and strong evidence of the scans overrules it. The
+    newest fix of a source replaces the one before.
+
+    Parameters
+    ----------
+    stamp : float
+        Time, s.
+    T_map_base : SE2
+        The pose.
+    covariance : ndarray, shape (3, 3)
+        Of x (m), y (m), yaw (rad) in the map frame.
+    source : str
+        Where it comes from, in the words that people will read.
+
+    Examples
+    --------
+    >>> fix = ff.PositionFix(0.0, ff.SE2(2.0, 1.5, 0.5), np.diag([0.04, 0.04, 0.1]), "the dock")
+    >>> outputs = ff.Localizer().handle(fix)
+    """
+
+    stamp: float
+    T_map_base: SE2
+    covariance: NDArray[np.float64] = field(repr=False)
+    source: str = "a position fix"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_map_base", as_pose(self.T_map_base, "T_map_base"))
@@ -79,6 +121,8 @@ class Reset:
     ----------
     stamp : float
         Time, s.
+    prior : Prior or None
+        What is known of the pose: `Near`, `Region`, `AnyOf`, `All`.
 
     Examples
     --------
@@ -86,6 +130,7 @@ class Reset:
     """
 
     stamp: float
+    prior: Prior | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,15 +151,15 @@ class NoMotionUpdate:
     stamp: float
 
 
-Input = NewMap | LaserScan | Odometry | Signal | PoseHint | Reset | NoMotionUpdate
+Input = NewMap | LaserScan | Odometry | Signal | PoseHint | PositionFix | Reset | NoMotionUpdate
 
 
 def check_input(given: object) -> None:
     """Raise InputError if a value is no input of a localizer."""
     if not isinstance(given, Input):
         raise InputError(
-            expected="an input: NewMap, LaserScan, Odometry, Signal, PoseHint, Reset "
-            "or NoMotionUpdate",
+            expected="an input: NewMap, LaserScan, Odometry, Signal, PoseHint, PositionFix, "
+            "Reset or NoMotionUpdate",
             received=type(given).__name__,
             remedy="wrap it, such as ff.NewMap(stamp, grid) for a map",
         )

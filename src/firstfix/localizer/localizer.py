@@ -8,6 +8,7 @@ import numpy as np
 
 from firstfix.amcl.particles import Particles
 from firstfix.belief.belief import Belief
+from firstfix.belief.prior import Gaussian
 from firstfix.belief.view import View
 from firstfix.core.arguments import as_instance
 from firstfix.core.errors import InputError
@@ -20,7 +21,7 @@ from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.deciding_motion import advise
 from firstfix.localizer.hint import Hint, read_hint
-from firstfix.localizer.inputs import Input, NewMap, PoseHint, Reset, check_input
+from firstfix.localizer.inputs import Input, NewMap, PoseHint, PositionFix, Reset, check_input
 from firstfix.localizer.outputs import Hypotheses, InitialPose, Output, Status
 from firstfix.localizer.place_belief import Pace, PlaceBelief, Support
 from firstfix.localizer.pose_monitor import Fit
@@ -64,7 +65,7 @@ class Localizer:
         self._state = State.NO_MAP
         self._cache_dir = cache_dir
         self._rng = np.random.default_rng(self.config.amcl.seed)
-        self._scans = ScanQueue()
+        self._scans = ScanQueue(self.config.scans)
         self._lifted: set[SignalKind] = set()
         self._update_requested = False
         self._hint: Hint | None = None
@@ -135,10 +136,10 @@ class Localizer:
             return [*said, *self._use_next_scan()]
         if isinstance(given, PoseHint):
             return self._take_hint(given)
+        if isinstance(given, PositionFix):
+            return self._take_fix(given)
         if isinstance(given, Reset):
-            # A base that was restarted in the air never reports that it was set down.
-            self._lifted.clear()
-            return [self._restart(given.stamp, Event.RESET, "reset requested: searching")]
+            return self._take_reset(given)
         self._update_requested = True
         return [self._status(given.stamp, "the next scan will be used in any case")]
 
@@ -207,6 +208,26 @@ class Localizer:
         self._fire(Event.HINT_RECEIVED)
         reason = f"{given.source} proposes a pose: the next scan will verify it"
         return [self._status(given.stamp, reason)]
+
+    def _take_fix(self, given: PositionFix) -> list[Output]:
+        try:
+            prior = Gaussian(given.T_map_base, given.covariance)
+            self._places.take_fix(given.source, prior, self._scans.odometry.at(given.stamp))
+        except InputError as error:
+            return [self._status(given.stamp, f"{given.source} refused: {error}")]
+        return []
+
+    def _take_reset(self, given: Reset) -> list[Output]:
+        # A base that was restarted in the air never reports that it was set down.
+        self._lifted.clear()
+        status = self._restart(given.stamp, Event.RESET, "reset requested: searching")
+        if given.prior is None:
+            return [status]
+        try:
+            self._places.restart(given.prior)
+        except InputError as error:
+            return [self._status(given.stamp, f"prior refused: {error}")]
+        return [status]
 
     def _use_next_scan(self) -> list[Output]:
         view = self._scans.pop() if self._state is not State.NO_MAP else None

@@ -21,6 +21,9 @@ _JUMP_RAD = math.radians(30.0)
 # Odometry this close to zero, m, has just been restarted, unless the robot came from nearby.
 _START_M = 0.05
 
+# Past its end, odometry is continued for this long by its last motion, s.
+_EXTRAPOLATED_S = 0.2
+
 # After a gap of several messages, a longer step than this needs a scan that confirms it.
 _LEAP_M = 0.5
 _GAP_MESSAGES = 3.0
@@ -102,6 +105,25 @@ class OdometryBuffer:
             a.y + share * (b.y - a.y),
             a.yaw + share * wrap(b.yaw - a.yaw),
         )
+
+    def motion(self, stamp: float, duration: float) -> SE2 | None:
+        """Return the motion of the base from a time on; None where it is unknown.
+
+        Parameters
+        ----------
+        stamp : float
+            When it begins, s.
+        duration : float
+            How long it takes, s. Up to 0.2 s after the last message, the robot is taken to move on
+            as before.
+        """
+        start, end = self.at(stamp), self.at(stamp + duration)
+        if start is not None and end is not None:
+            return start.inverse() @ end
+        if self.last is None or not 0.0 < stamp + duration - self.last.stamp <= _EXTRAPOLATED_S:
+            return None
+        before = self.at(self.last.stamp - duration)
+        return None if before is None else before.inverse() @ self.last.T_odom_base
 
 
 def _has_jumped(last: Odometry, new: Odometry) -> bool:

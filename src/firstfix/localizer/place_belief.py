@@ -87,6 +87,7 @@ class PlaceBelief:
         self._places: tuple[Hypothesis, ...] = ()
         self._credit = 0  # views that have confirmed the published pose
         self._views_against = 0
+        self._fixes: dict[str, Prior] = {}  # by their source
         self.belief = begin(fields, None, config)
 
     @property
@@ -143,6 +144,28 @@ class PlaceBelief:
             If the prior does not fit the map. The belief stays as it was.
         """
         self.belief = with_prior(self.belief, prior, self.belief.odometry)
+
+    def take_fix(self, source: str, prior: Prior, T_odom_base: SE2 | None) -> None:
+        """Add a prior in place of the one before of its source.
+
+        Parameters
+        ----------
+        source : str
+            Where it comes from.
+        prior : Prior
+            Of the pose at ``T_odom_base``.
+        T_odom_base : SE2 or None
+            Odometry at that time; None for the next view.
+
+        Raises
+        ------
+        InputError
+            If the prior does not fit the map. The belief stays as it was.
+        """
+        before = self._fixes.get(source)
+        kept = tuple(hint for hint in self.belief.hints if hint.prior is not before)
+        self.belief = with_prior(replace(self.belief, hints=kept), prior, T_odom_base)
+        self._fixes[source] = prior
 
     def update(self, scans: Scans, T_odom_base: SE2, pace: Pace) -> bool:
         """Predict, and weigh all places by a scan if one is due.

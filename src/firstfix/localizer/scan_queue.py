@@ -8,14 +8,20 @@ from dataclasses import replace
 
 from firstfix.belief.belief import REST_M, REST_RAD
 from firstfix.belief.view import View
+from firstfix.core.deskew import LONGEST_SWEEP_S, straighten
 from firstfix.core.odometry import Odometry
 from firstfix.core.scan import LaserScan
+from firstfix.localizer.config import ScansConfig
 from firstfix.localizer.odometry_buffer import OdometryBuffer
 from firstfix.localizer.sensor_clocks import SensorClocks
 
 # Odometry may lag by so many scans: a second at 40 Hz. With a queue of one scan, odometry that lags
 # by more than the time between two scans would starve the localizer.
 _MOST_WAITING = 40
+
+# Motion during a scan below which it is not worth straightening.
+_SLIGHT_M = 0.001
+_SLIGHT_RAD = math.radians(0.05)
 
 # A robot rests if odometry has not moved for so long, s.
 _REST_S = 1.0
@@ -26,9 +32,15 @@ class ScanQueue:
 
     Scans of several sensors that were taken at about the same time are one view. A view waits for
     the sensors that are about to send.
+
+    Parameters
+    ----------
+    config : ScansConfig
+        Whether scans are straightened.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, config: ScansConfig) -> None:
+        self._config = config
         self.odometry = OdometryBuffer()
         self._instants: deque[list[LaserScan]] = deque(maxlen=_MOST_WAITING)
         self._clocks = SensorClocks()
@@ -129,6 +141,7 @@ class ScanQueue:
             T_odom_then = self.odometry.at(scan.stamp)
             if T_odom_base is None or T_odom_then is None:
                 return scan
+            scan = self._straightened(scan)  # noqa: PLW2901
             if T_odom_then != T_odom_base:
                 T_now_then = T_odom_base.inverse() @ T_odom_then
                 scan = replace(scan, T_base_laser=T_now_then @ scan.T_base_laser)  # noqa: PLW2901
@@ -136,6 +149,17 @@ class ScanQueue:
         self._used_until = now
         assert T_odom_base is not None  # noqa: S101 - there is a scan
         return View(tuple(moved), T_odom_base)
+
+    def _straightened(self, scan: LaserScan) -> LaserScan:
+        """Straighten a scan of a robot that moved meanwhile."""
+        sweep_s = scan.time_increment * (len(scan) - 1)
+        if not self._config.deskew or not 0.0 < sweep_s <= LONGEST_SWEEP_S:
+            return scan
+        motion = self.odometry.motion(scan.stamp, sweep_s)
+        if motion is None:
+            return scan
+        is_slight = math.hypot(motion.x, motion.y) < _SLIGHT_M and abs(motion.yaw) < _SLIGHT_RAD
+        return scan if is_slight else straighten(scan, motion)
 
     def _view_apart(self, last: Odometry) -> View | None:
         """Return the scan of a sensor with another clock; at rest its time does not count."""

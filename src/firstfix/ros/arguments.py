@@ -12,7 +12,7 @@ from firstfix.io.parameters.ros_parameters import read_parameters
 from firstfix.io.safe_yaml import kind, load_mapping
 from firstfix.ros.names import Names
 from firstfix.ros.node_config import NodeConfig
-from firstfix.ros.parameters import configured, defaults, parameters
+from firstfix.ros.parameters import configured, defaults, joined, parameters
 
 _NODE, _NAMESPACE = ("__node", "__name"), "__ns"
 
@@ -107,6 +107,8 @@ def _split(rule: str, example: str) -> tuple[str, str]:
 
 
 def _scalar(name: str, value: Any) -> bool | int | float | str:
+    if isinstance(defaults().get(name), str):
+        value = joined(value)
     if isinstance(value, (bool, int, float, str)):
         return value
     raise InputError(

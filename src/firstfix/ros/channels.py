@@ -43,11 +43,15 @@ class Channel(Enum):
     """Where a message came from: a topic, a service, or the program itself."""
 
     SCAN = "scan"
+    CLOUD = "points"
+    DEPTH = "depth image"
+    CAMERA_INFO = "camera_info"
     MAP = "map"
     TF = "tf"
     TF_STATIC = "tf_static"
     ODOM = "odom"
     INITIAL_POSE = "initialpose"
+    POSITION_FIX = "position_fix"
     CLIFF = "events/cliff"
     WHEEL_DROP = "events/wheel_drop"
     BUMPER = "events/bumper"
@@ -56,6 +60,9 @@ class Channel(Enum):
     UPDATE = "request_nomotion_update"
     INPUT = "input"
 
+
+SENSORS = frozenset({Channel.SCAN, Channel.CLOUD, Channel.DEPTH})
+"""Channels whose messages become scans."""
 
 POSE_TYPE = "geometry_msgs/PoseWithCovarianceStamped"
 
@@ -120,7 +127,7 @@ def subscribed_topics(config: NodeConfig) -> dict[Channel, Topic]:
     sensor, reliable = Delivery.SENSOR, Delivery.RELIABLE
     scan, grid, press = "sensor_msgs/LaserScan", "nav_msgs/OccupancyGrid", "the robot was lifted"
     topics = {
-        Channel.SCAN: Topic(config.scan_topic, scan, sensor, "the scans"),
+        Channel.SCAN: Topic(_scan_topics(config)[0], scan, sensor, "the scans"),
         Channel.TF: replace(TF, meaning="odometry, and sensors that move on the robot"),
         Channel.TF_STATIC: Topic(
             "/tf_static", "tf2_msgs/TFMessage", Delivery.LATCHED_MANY, "where the sensor is mounted"
@@ -129,6 +136,9 @@ def subscribed_topics(config: NodeConfig) -> dict[Channel, Topic]:
             "odom", "nav_msgs/Odometry", sensor, "odometry of robots that do not have it on `/tf`"
         ),
         Channel.INITIAL_POSE: replace(INITIAL_POSE, meaning="a hint of a person, such as in RViz"),
+        Channel.POSITION_FIX: Topic(
+            "position_fix", POSE_TYPE, reliable, "a measured pose, such as of a fiducial: a prior"
+        ),
         Channel.CLIFF: Topic("events/cliff", "kobuki/CliffEvent", reliable, press),
         Channel.WHEEL_DROP: Topic("events/wheel_drop", "kobuki/WheelDropEvent", reliable, press),
         Channel.BUMPER: Topic(
@@ -142,6 +152,47 @@ def subscribed_topics(config: NodeConfig) -> dict[Channel, Topic]:
         meaning = "the map, unless `yaml_filename` names a file"
         topics[Channel.MAP] = Topic(config.map_topic, grid, Delivery.LATCHED, meaning)
     return topics
+
+
+def subscriptions(config: NodeConfig) -> list[tuple[Channel, Topic]]:
+    """Return all topics that a node subscribes to: `subscribed_topics`, and of further sensors.
+
+    Parameters
+    ----------
+    config : NodeConfig
+        Names the topics.
+
+    Returns
+    -------
+    list of tuple of Channel and Topic
+        A channel may be there several times.
+    """
+    first = subscribed_topics(config)
+    scan = first[Channel.SCAN]
+    cloud = Topic("", "sensor_msgs/PointCloud2", Delivery.SENSOR, "3D points, of `cloud_topics`")
+    depth = Topic("", "sensor_msgs/Image", Delivery.SENSOR, "depth images, of `depth_topics`")
+    info = Topic("", "sensor_msgs/CameraInfo", Delivery.SENSOR, "beside each of `depth_topics`")
+    lasers = [(Channel.SCAN, replace(scan, name=name)) for name in _scan_topics(config)]
+    clouds = [(Channel.CLOUD, replace(cloud, name=name)) for name in config.cloud_topics.split()]
+    cameras = [
+        pair
+        for name in config.depth_topics.split()
+        for pair in (
+            (Channel.DEPTH, replace(depth, name=name)),
+            (Channel.CAMERA_INFO, replace(info, name=_beside(name))),
+        )
+    ]
+    rest = [(channel, topic) for channel, topic in first.items() if channel is not Channel.SCAN]
+    return [*lasers, *clouds, *cameras, *rest]
+
+
+def _scan_topics(config: NodeConfig) -> list[str]:
+    return config.scan_topics.split() or [config.scan_topic]
+
+
+def _beside(name: str) -> str:
+    folder = name.rpartition("/")[0]
+    return f"{folder}/camera_info" if folder or name.startswith("/") else "camera_info"
 
 
 def published_topics(config: NodeConfig, particles: Topic) -> tuple[Topic, ...]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from collections.abc import Hashable
 from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
 
 
 class Inbox(Generic[Item]):
-    """A queue that keeps everything but scans, of which it keeps the newest.
+    """A queue that keeps everything but scans, of which it keeps the newest of each sensor.
 
     Callbacks never wait for the worker.
     """
@@ -18,7 +19,7 @@ class Inbox(Generic[Item]):
     def __init__(self) -> None:
         self._changed = threading.Condition()
         self._kept: deque[Item] = deque()
-        self._scan: Item | None = None
+        self._scans: dict[Hashable, Item] = {}
         self._is_closed = False
 
     @property
@@ -32,10 +33,11 @@ class Inbox(Generic[Item]):
             self._kept.append(item)
             self._changed.notify()
 
-    def put_scan(self, item: Item) -> None:
-        """Queue a scan in place of one that the worker has not taken yet."""
+    def put_scan(self, item: Item, sensor: Hashable = None) -> None:
+        """Queue a scan in place of one of its sensor that the worker has not taken yet."""
         with self._changed:
-            self._scan = item
+            self._scans.pop(sensor, None)
+            self._scans[sensor] = item
             self._changed.notify()
 
     def take(self, timeout_s: float) -> list[Item]:
@@ -49,17 +51,15 @@ class Inbox(Generic[Item]):
         Returns
         -------
         list
-            In the order of arrival, the scan last; empty after the timeout and after `close`.
+            In the order of arrival, the scans last; empty after the timeout and after `close`.
         """
         with self._changed:
             self._changed.wait_for(self._has_items, timeout_s)
             if self._is_closed:
                 return []
-            items = [*self._kept]
-            if self._scan is not None:
-                items.append(self._scan)
+            items = [*self._kept, *self._scans.values()]
             self._kept.clear()
-            self._scan = None
+            self._scans.clear()
             return items
 
     def close(self) -> None:
@@ -69,4 +69,4 @@ class Inbox(Generic[Item]):
             self._changed.notify()
 
     def _has_items(self) -> bool:
-        return self._is_closed or bool(self._kept) or self._scan is not None
+        return self._is_closed or bool(self._kept) or bool(self._scans)

@@ -11,9 +11,9 @@ from typing import Any
 from firstfix.core.errors import InputError
 from firstfix.core.odometry import Signal, SignalKind
 from firstfix.io.ros_messages.incoming import (
+    to_covariance,
     to_frame,
     to_grid,
-    to_laser_scan,
     to_odometry,
     to_planar,
     to_pose,
@@ -24,10 +24,11 @@ from firstfix.io.ros_messages.incoming import (
 from firstfix.io.ros_messages.robot_frames import RobotFrames
 from firstfix.io.ros_messages.tf_buffer import LookupFailure
 from firstfix.io.saved_pose import map_key
-from firstfix.localizer.inputs import Input, NewMap, NoMotionUpdate, PoseHint, Reset
-from firstfix.ros.channels import Channel
+from firstfix.localizer.inputs import Input, NewMap, NoMotionUpdate, PoseHint, PositionFix, Reset
+from firstfix.ros.channels import SENSORS, Channel
 from firstfix.ros.exact_stamps import ExactStamps
 from firstfix.ros.node_config import NodeConfig
+from firstfix.ros.sensor_messages import SensorMessages
 
 # Odometry that stays behind the scans by more than this, for this time, has another clock, s.
 _LAG_S = 1.0
@@ -77,7 +78,8 @@ class MessageConverter:
         self._stamps = stamps
         self._warn = warn
         self._frames = RobotFrames(config.odom_frame_id, config.base_frame_id)
-        self._waiting: deque[Any] = deque(maxlen=_MAX_WAITING)
+        self._sensors = SensorMessages(config, warn)
+        self._waiting: deque[tuple[Channel, Any]] = deque(maxlen=_MAX_WAITING)
         self._dropped: Counter[str] = Counter()
         self._lags_since: float | None = None
         self._pressed: set[tuple[Channel, int]] = set()
@@ -103,8 +105,13 @@ class MessageConverter:
         InputError
             If it cannot be used.
         """
-        if channel is Channel.SCAN:
-            return self._convert_scan(message)
+        if channel in SENSORS:
+            return self._convert_scan(channel, message)
+        if channel is Channel.CAMERA_INFO:
+            self._sensors.keep_camera(message)
+            return []
+        if channel is Channel.POSITION_FIX:
+            return self._convert_fix(message)
         if channel is Channel.TF:
             transforms = map(to_transform, message.transforms)
             return self._after_transforms(self._frames.add_moving(transforms))
@@ -153,26 +160,28 @@ class MessageConverter:
             return [given]
         return self.use_map(replace(given, stamp=max(given.stamp, self._now)))
 
-    def _convert_scan(self, message: Any) -> list[Input]:
+    def _convert_scan(self, channel: Channel, message: Any) -> list[Input]:
         stamp, frame = self._stamps.add(message.header.stamp), to_frame(message.header.frame_id)
         if stamp <= 0.0:
             return self._drop("a scan has no stamp: its driver must write one")
-        if (back_s := self._frames.clock_step_at_scan(stamp)) > 0.0:
+        if (back_s := self._frames.clock_step_at_scan(stamp, frame)) > 0.0:
             return self._drop(f"the clock was set back: scans by {back_s:.2f} s")
         reach = self._frames.reach
         if isinstance(reach, LookupFailure):
             odom, base = self._config.odom_frame_id, self._config.base_frame_id
             return self._drop(f"odometry ({odom} -> {base}) is unknown: {reach.why}")
-        laser = self._frames.laser_at(frame, stamp)
-        if isinstance(laser, LookupFailure):
+        pose = self._sensors.pose_of(message, stamp, self._frames)
+        if isinstance(pose, LookupFailure):
             has_room = len(self._waiting) < _MAX_WAITING
-            if laser.later:
-                self._waiting.append(message)
+            if pose.later:
+                self._waiting.append((channel, message))
                 if has_room:
                     return []
-            return self._drop(f"the pose of the laser is unknown: {laser.why}")
+            return self._drop(f"the pose of the laser is unknown: {pose.why}")
         self._check_lag(stamp, reach)
-        scan = to_laser_scan(message, T_base_laser=laser.T_base_laser, mounting=laser.mounting)
+        scan = self._sensors.scan(channel, message, stamp, pose)
+        if channel is Channel.SCAN:
+            self._sensors.check_skew(message, self._frames)
         # Where fixed transforms join odometry and base, odometry is known at any time.
         is_fixed = reach == math.inf
         odometry = self._frames.odometry_at if is_fixed else self._frames.extrapolated
@@ -203,12 +212,15 @@ class MessageConverter:
         if back_s > 0.0:
             self._warn("clock", f"time went back by {back_s:.1f} s: starting over")
             return [self._reset(), *inputs]
-        ready = [scan for message in waiting if (scan := self._convert_waiting(message))]
-        return [*inputs, *(ready[-1] if ready else ())]
+        ready: dict[str, list[Input]] = {}  # the newest of each sensor
+        for channel, message in waiting:
+            if scan := self._convert_waiting(channel, message):
+                ready[message.header.frame_id] = scan
+        return [*inputs, *(given for scan in ready.values() for given in scan)]
 
-    def _convert_waiting(self, message: Any) -> list[Input]:
+    def _convert_waiting(self, channel: Channel, message: Any) -> list[Input]:
         try:
-            return self._convert_scan(message)
+            return self._convert_scan(channel, message)
         except InputError as error:  # the odometry of the same message is still good
             return self._drop(f"a scan cannot be used: {error}")
 
@@ -231,6 +243,16 @@ class MessageConverter:
                 remedy="set the fixed frame of the viewer to the frame of the map",
             )
         return [PoseHint(hint.stamp or self._now, to_planar(hint))]
+
+    def _convert_fix(self, message: Any) -> list[Input]:
+        fix, expected = to_pose(message), self._config.global_frame_id
+        if fix.parent != expected:
+            raise InputError(
+                expected=f"a position fix in {expected}",
+                received=f"one in {fix.parent or 'no frame'}",
+                remedy="transform it to the frame of the map",
+            )
+        return [PositionFix(fix.stamp or self._now, to_planar(fix), to_covariance(message))]
 
     def _convert_event(self, channel: Channel, message: Any) -> list[Input]:
         which, is_pressed = to_pressed(message)

@@ -11,15 +11,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from firstfix.belief.prior import AnyOf, Region
 from firstfix.core.errors import InputError, MapError
+from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.fields.cache import cache_folder
+from firstfix.global_localization.prior import Prior
+from firstfix.io.maps.zones import load_zones
 from firstfix.io.ros_messages.outgoing import occupancy_grid
-from firstfix.localizer.inputs import Input, NewMap
+from firstfix.localizer.inputs import Input, NewMap, Reset
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Output
 from firstfix.localizer.precompile import precompile
-from firstfix.ros.channels import Channel, subscribed_topics
+from firstfix.ros.channels import SENSORS, Channel, subscribed_topics
 from firstfix.ros.exact_stamps import ExactStamps
 from firstfix.ros.inbox import Inbox
 from firstfix.ros.map_files import map_from, path_of, result_of
@@ -65,6 +69,7 @@ class Node:
         self._publisher = OutputPublisher(config, stamps, transport)
         self._memory = PoseMemory(config, transport.log)
         self._localizer = Localizer(config.localizer, cache_folder())
+        self._prior: Prior | None = None  # of the first search
         self._map: NewMap | None = None  # of yaml_filename, then the one in use
         self._logged_at: dict[str, float] = {}
         self._received: set[Channel] = set()
@@ -82,8 +87,7 @@ class Node:
         InputError
             If the map file cannot be used.
         """
-        if self._config.yaml_filename:
-            self._map = map_from(Path(self._config.yaml_filename))
+        self._load_own_map()
         self.expects_topics_since = time.monotonic()
         self._worker.start()
 
@@ -103,11 +107,13 @@ class Node:
         message : message
             None for a request.
         """
-        is_scan = channel is Channel.SCAN or isinstance(message, LaserScan)
-        if is_scan:
-            self._scan_at = time.monotonic()  # here: a search may keep the worker for seconds
-        put = self._inbox.put_scan if is_scan else self._inbox.put
-        put((channel, message))
+        if not _is_scan(channel, message):
+            self._inbox.put((channel, message))
+            return
+        self._scan_at = time.monotonic()  # here: a search may keep the worker for seconds
+        of_robot = isinstance(message, LaserScan)
+        sensor = message.sensor if of_robot else message.header.frame_id
+        self._inbox.put_scan((channel, message), (channel, sensor))
 
     def give(self, given: Input) -> None:
         """Queue an input that needs no conversion, such as a hint from the live page."""
@@ -172,6 +178,24 @@ class Node:
         grid = occupancy_grid(self._transport.make, 0.0, frame, loaded.grid)
         return {"result": int(LoadResult.SUCCESS), "map": grid}
 
+    def _load_own_map(self) -> None:
+        if self._config.yaml_filename:
+            self._map = map_from(Path(self._config.yaml_filename))
+            self._prior = self._prior_of_zones(self._map.grid)
+
+    def _prior_of_zones(self, grid: OccupancyGrid) -> Prior | None:
+        names = self._config.zones.split()
+        if not names:
+            return None
+        zones = load_zones(self._config.yaml_filename)
+        for name in names:
+            if name not in zones:
+                raise InputError(f"There is no zone {name}. Choose one of {', '.join(zones)}.")
+        regions = tuple(Region(zones[name]) for name in names)
+        for region in regions:
+            region.check(grid)
+        return regions[0] if len(regions) == 1 else AnyOf(regions)
+
     def _work(self) -> None:
         self._try(self._prepare)
         while not self._inbox.is_closed:
@@ -188,14 +212,16 @@ class Node:
     def _prepare(self) -> None:
         precompile(self._config.localizer.amcl)
         if self._map is not None:
+            stamp, prior = self._map.stamp, self._prior
             self._handle_all(self._converter.use_map(self._map))
+            if prior is not None:
+                self._handle(Reset(stamp, prior))
 
     def _take_all(self, items: list[tuple[Channel, Any]]) -> None:
         for channel, message in items:
             if self._inbox.is_closed:
                 return
-            is_scan = channel is Channel.SCAN or isinstance(message, LaserScan)
-            self._received.add(Channel.SCAN if is_scan else channel)
+            self._received.add(Channel.SCAN if _is_scan(channel, message) else channel)
             self._try(self._take, channel, message)
 
     def _take(self, channel: Channel, message: Any) -> None:
@@ -272,6 +298,10 @@ class Node:
                 self.warn_throttled(channel.value, text)
         # A map comes once. Missing odometry is reported with each scan.
         self._received &= {Channel.MAP}
+
+
+def _is_scan(channel: Channel, message: Any) -> bool:
+    return channel in SENSORS or isinstance(message, LaserScan)
 
 
 def _refusal(url: str) -> LoadResult:

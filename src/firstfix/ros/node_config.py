@@ -5,8 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
+import numpy as np
+from numpy.typing import NDArray
+
+from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.core.settings import check_settings, setting
+from firstfix.io.ros_messages.sensor_place import given_poses
 from firstfix.localizer.config import LocalizerConfig
 
 
@@ -43,9 +48,39 @@ class NodeConfig:
     odom_frame_id: str = setting("odom", "frame of the odometry")
     global_frame_id: str = setting("map", "frame of the map")
     scan_topic: str = setting("scan", "topic of the scans")
+    scan_topics: str = setting(
+        "",
+        "topics of the scans of several lasers, which decide together: a list, or names with "
+        "spaces between; empty: scan_topic",
+    )
+    cloud_topics: str = setting(
+        "", "topics of 3D points (sensor_msgs/PointCloud2), likewise; empty: none"
+    )
+    depth_topics: str = setting(
+        "", "topics of depth images, likewise, each with camera_info beside it; empty: none"
+    )
+    height_band: str = setting(
+        "0.1 1.8",
+        "lowest and highest height above the base of 3D points that are compared with the map, m; "
+        "the ground must be below",
+    )
+    laser_pose: str = setting(
+        "",
+        "X,Y,YAW of the sensor on the robot (m, rad) where tf lacks it; X,Y,YAW,3.14 is upside "
+        "down; X,Y,Z,ROLL,PITCH,YAW for 3D points; front_laser=X,Y,YAW for one of several; empty: "
+        "by tf",
+    )
+    laser_frame: str = setting(
+        "", "frame of the sensor in tf, in place of that in its messages; empty: as they say"
+    )
     map_topic: str = setting("map", "topic of the map")
     first_map_only: bool = setting(False, "ignore maps after the first")
 
+    zones: str = setting(
+        "",
+        "zones of the map in which the robot is at the start, from the file MAP.zones.yaml beside "
+        "yaml_filename: a list, or names with spaces between; empty: anywhere",
+    )
     set_initial_pose: bool = setting(False, "start at initial_pose")
     initial_pose: SE2 = setting(SE2.identity(), "pose of the base in the map at the start")
     always_reset_initial_pose: bool = setting(
@@ -71,3 +106,31 @@ class NodeConfig:
 
     def __post_init__(self) -> None:
         check_settings(self)
+        if not self.band[0] < self.band[1]:
+            raise InputError(
+                f"height_band {self.height_band} is empty. Write the lower height first, such as "
+                "0.1 1.8."
+            )
+        given_poses(self.laser_pose)
+        if self.zones and not self.yaml_filename:
+            raise InputError(
+                "zones are in a file beside the map, but yaml_filename is empty. Set it, or leave "
+                "zones empty."
+            )
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Lowest and highest height of 3D points, m."""
+        try:
+            low, high = (float(number) for number in self.height_band.split())
+        except ValueError:
+            raise InputError(
+                f"height_band {self.height_band} is not two heights. Write them in metres, such as "
+                "0.1 1.8."
+            ) from None
+        return low, high
+
+    @property
+    def sensor_poses(self) -> dict[str, NDArray[np.float64]]:
+        """Poses of sensors, shape (4, 4), by frame; an empty frame stands for all others."""
+        return given_poses(self.laser_pose)

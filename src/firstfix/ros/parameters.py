@@ -20,9 +20,9 @@ from firstfix.localizer.config import LocalizerConfig
 from firstfix.ros.node_config import NodeConfig
 
 _POSE_PARTS = ("x", "y", "yaw")
-_FRAMES = ("base_frame_id", "odom_frame_id", "global_frame_id")
+_FRAMES = ("base_frame_id", "odom_frame_id", "global_frame_id", "laser_frame")
 # The filter's parameters have no prefix: users know them by Nav2's names.
-_NODE, _FILTER = "node", "amcl"
+_NODE, _FILTER, _SCANS = "node", "amcl", "scans"
 _NO_INJECTION = "a node recovers by searching the whole map for the scan, not by random particles"
 # Parameters that have no effect in a node, and why.
 _WITHOUT_EFFECT = {
@@ -185,7 +185,7 @@ def _entries() -> Iterator[tuple[str, str, Field[Any]]]:
     """Return each setting with its section and its flat name, in the order of the documents."""
     owners = {_NODE: NodeConfig, _FILTER: _algorithms()[_FILTER]} | _algorithms()
     for section, owner in owners.items():
-        prefix = "" if section in (_NODE, _FILTER) else f"{section}."
+        prefix = "" if section in (_NODE, _FILTER, _SCANS) else f"{section}."
         for entry in fields(owner):
             if "description" in entry.metadata:
                 yield section, prefix + entry.name, entry
@@ -197,6 +197,8 @@ def _typed(name: str, value: Any) -> Any:
     if name not in known:
         raise _unknown(name, value, known)
     default = known[name]
+    if isinstance(default, str):
+        value = joined(value)
     if isinstance(default, Enum) and not isinstance(value, Enum):
         words = choices(default)
         if not isinstance(value, str) or value not in words:
@@ -214,6 +216,13 @@ def _typed(name: str, value: Any) -> Any:
             remedy="write metres and radians",
         )
     return to_frame(value) if name in _FRAMES and isinstance(value, str) else value
+
+
+def joined(value: Any) -> Any:
+    """Return a list of words or numbers as one text, with spaces between; others as they are."""
+    if isinstance(value, (list, tuple)) and all(isinstance(v, (str, int, float)) for v in value):
+        return " ".join(str(part) for part in value)
+    return value
 
 
 def _unknown(name: str, value: Any, known: Mapping[str, Any]) -> InputError:

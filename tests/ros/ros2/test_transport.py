@@ -213,6 +213,7 @@ def test_qualities_of_service_are_those_of_nav2(lab: Lab) -> None:
         "/tf_static": (100, "RELIABLE", "TRANSIENT_LOCAL"),
         "odom": (5, "BEST_EFFORT", "VOLATILE"),
         "initialpose": (10, "RELIABLE", "VOLATILE"),
+        "position_fix": (10, "RELIABLE", "VOLATILE"),
         "events/cliff": (10, "RELIABLE", "VOLATILE"),
         "events/wheel_drop": (10, "RELIABLE", "VOLATILE"),
         "events/bumper": (10, "RELIABLE", "VOLATILE"),

@@ -158,7 +158,7 @@ def _load_points(bag: BagFile, topic: str, kind: str, n_most: int, given: GivenF
             f"{topic} are unknown. Record the static transforms, or name frames by --base-frame "
             "and --laser-frame."
         )
-    convert = converter(bag, topic, kind, T_base_sensor)
+    convert = converter(bag, topic, kind, T_base_sensor, given.band)
     scans = []
     for i, item in enumerate(islice(bag.messages(kind, [topic]), n_most + SORTED_AHEAD)):
         sweep = _Sweep(*item)

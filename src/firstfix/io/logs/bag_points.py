@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -10,20 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.errors import ScanError
-from firstfix.core.points import scan_from_points
+from firstfix.core.points import DEFAULT_BAND_M, scan_from_points
 from firstfix.core.scan import LaserScan
 from firstfix.io.logs.bag_file import CAMERA_INFO, CLOUD, DEPTH, BagFile
-from firstfix.io.ros_messages.points import to_depth_points, to_points
+from firstfix.io.ros_messages.points import scan_from_depth, to_points
 
 KINDS = (CLOUD, DEPTH)
-
-# Nobody builds a depth camera that reaches farther.
-_DEPTH_RANGE_MAX_M = 10.0
 
 Converter = Callable[[Any, float], LaserScan]
 
 
-def converter(bag: BagFile, topic: str, kind: str, T_base_sensor: NDArray[np.float64]) -> Converter:
+def converter(
+    bag: BagFile,
+    topic: str,
+    kind: str,
+    T_base_sensor: NDArray[np.float64],
+    band: tuple[float, float] = DEFAULT_BAND_M,
+) -> Converter:
     """Return the function that makes a scan of a message and its stamp.
 
     Parameters
@@ -36,6 +38,8 @@ def converter(bag: BagFile, topic: str, kind: str, T_base_sensor: NDArray[np.flo
         One of `KINDS`.
     T_base_sensor : ndarray, shape (4, 4)
         Pose of the sensor.
+    band : tuple of float
+        Lowest and highest height above the base frame, m.
 
     Raises
     ------
@@ -44,23 +48,10 @@ def converter(bag: BagFile, topic: str, kind: str, T_base_sensor: NDArray[np.flo
     """
     if kind == CLOUD:
         return lambda message, stamp: scan_from_points(
-            to_points(message), T_base_sensor, stamp=stamp
+            to_points(message), T_base_sensor, band, stamp=stamp
         )
     info = _camera_info(bag, topic)
-    # The optical axis in the base frame: z of the optical frame.
-    heading = math.atan2(T_base_sensor[1, 2], T_base_sensor[0, 2])
-
-    def convert(message: Any, stamp: float) -> LaserScan:
-        points, (left, right) = to_depth_points(message, info)
-        return scan_from_points(
-            points,
-            T_base_sensor,
-            view=(heading - right, heading + left),
-            range_max=_DEPTH_RANGE_MAX_M,
-            stamp=stamp,
-        )
-
-    return convert
+    return lambda message, stamp: scan_from_depth(message, info, T_base_sensor, band, stamp)
 
 
 def _camera_info(bag: BagFile, topic: str) -> Any:

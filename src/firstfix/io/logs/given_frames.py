@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from firstfix.core.points import DEFAULT_BAND_M
 from firstfix.core.scan import Mounting
 from firstfix.core.se2 import SE2
 
@@ -22,12 +23,15 @@ class GivenFrames:
         Frame of the robot.
     laser : str or None
         Frame of the sensor, in place of the one in its messages.
+    band : tuple of float
+        Lowest and highest height above the base of 3D points that are used, m.
     """
 
     T_base_laser: SE2 | None = None
     mounting: Mounting = Mounting.UPRIGHT
     base: str | None = None
     laser: str | None = None
+    band: tuple[float, float] = DEFAULT_BAND_M
 
     @property
     def any(self) -> bool:

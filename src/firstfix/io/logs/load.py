@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from firstfix.core.arguments import as_member, as_pose
 from firstfix.core.errors import ScanError
+from firstfix.core.points import DEFAULT_BAND_M
 from firstfix.core.recording import Recording
 from firstfix.core.scan import Mounting
 from firstfix.core.se2 import SE2
@@ -18,7 +20,7 @@ BAG_SUFFIXES = (".bag", ".db3", ".mcap")
 CARMEN_SUFFIXES = (".log", ".clf", ".carmen")
 
 
-def load_recording(
+def load_recording(  # noqa: PLR0913 - each is a fact that a log may lack
     path: str | Path,
     *,
     topic: str | Sequence[str] | None = None,
@@ -27,6 +29,7 @@ def load_recording(
     mounting: Mounting | str = Mounting.UPRIGHT,
     base_frame: str | None = None,
     laser_frame: str | None = None,
+    height_band: tuple[float, float] = DEFAULT_BAND_M,
 ) -> Recording:
     """Read a recording in any supported format.
 
@@ -46,6 +49,9 @@ def load_recording(
         Which way up it is then.
     base_frame, laser_frame : str, optional
         Frames of the robot and of the sensor, where those that a bag states are wrong.
+    height_band : tuple of float
+        Lowest and highest height above the base of points that are used, m, for point clouds and
+        depth images.
 
     Returns
     -------
@@ -66,7 +72,8 @@ def load_recording(
     """
     path = Path(path)
     pose = None if T_base_laser is None else as_pose(T_base_laser, "T_base_laser")
-    given = GivenFrames(pose, as_member(Mounting, mounting, "mounting"), base_frame, laser_frame)
+    which_way = as_member(Mounting, mounting, "mounting")
+    given = GivenFrames(pose, which_way, base_frame, laser_frame, height_band)
     topics = (topic,) if topic is None or isinstance(topic, str) else tuple(topic) or (None,)
     if len(topics) == 1:
         return _load(path, topics[0], max_scans, given)
@@ -85,7 +92,7 @@ def _together(recordings: Sequence[Recording]) -> Recording:
     sensors = np.repeat(np.arange(len(recordings)), [len(recording) for recording in recordings])
     order = np.argsort([scan.stamp for scan in scans], kind="stable")
     return Recording(
-        scans=tuple(scans[i] for i in order),
+        scans=tuple(replace(scans[i], sensor=str(sensors[i])) for i in order),
         odometry=max((r.odometry for r in recordings if r.odometry), key=len, default=None),
         sensors=sensors[order],
         notes=tuple(dict.fromkeys(note for recording in recordings for note in recording.notes)),

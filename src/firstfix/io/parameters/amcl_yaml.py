@@ -96,6 +96,9 @@ def _converted(value: Any, default: Any) -> Any:
     """Return a value in the type of the default; None if ROS would reject its type."""
     if isinstance(default, Enum):
         return choices(default).get(value) if isinstance(value, str) else None
+    if isinstance(default, str) and isinstance(value, list) and value:
+        words = all(type(each) in (str, int, float) for each in value)
+        return " ".join(map(str, value)) if words else None
     if isinstance(default, (str, bool)):
         return value if type(value) is type(default) and value != "" else None
     if type(value) not in (int, float) or not abs(value) <= sys.float_info.max:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from firstfix.core.angles import FULL_TURN
 from firstfix.core.errors import InputError, MapError, ScanError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan, Mounting
@@ -86,6 +87,7 @@ def to_laser_scan(
     T_base_laser: SE2,
     mounting: Mounting,
     stamp: float | None = None,
+    sensor: str = "",
 ) -> LaserScan:
     """Convert a ``sensor_msgs/LaserScan``.
 
@@ -102,6 +104,8 @@ def to_laser_scan(
         Upright or upside down.
     stamp : float or None
         Time to use instead of the one in the header, s.
+    sensor : str
+        Name of the sensor.
 
     Returns
     -------
@@ -123,14 +127,49 @@ def to_laser_scan(
         stamp=to_seconds(message.header.stamp) if stamp is None else stamp,
         T_base_laser=T_base_laser,
         mounting=mounting,
-        time_increment=_time_increment(message),
+        time_increment=to_time_increment(message),
+        sensor=sensor,
     )
 
 
-def _time_increment(message: Any) -> float:
-    """Return the time between two beams, s; 0 for what some drivers send instead of it."""
+def to_time_increment(message: Any) -> float:
+    """Return the time between two beams of a ``sensor_msgs/LaserScan``, s; 0 if it is unknown.
+
+    Some drivers send ``scan_time`` only: the time of a full turn.
+    """
     step = float(getattr(message, "time_increment", 0.0))
-    return step if 0.0 < step < math.inf else 0.0
+    if 0.0 < step < math.inf:
+        return step
+    turn = float(getattr(message, "scan_time", 0.0))
+    if not 0.0 < turn < math.inf:
+        return 0.0
+    return turn * abs(float(message.angle_increment)) / FULL_TURN
+
+
+def to_covariance(message: Any) -> NDArray[np.float64]:
+    """Convert the covariance of a ``geometry_msgs/PoseWithCovarianceStamped``.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Of x (m), y (m), yaw (rad).
+
+    Raises
+    ------
+    InputError
+        If it is no covariance.
+    """
+    c = np.asarray(message.pose.covariance, np.float64)
+    planar = np.full((3, 3), np.nan)
+    if c.size == 36:
+        planar = c.reshape(6, 6)[np.ix_([0, 1, 5], [0, 1, 5])]
+    if np.isfinite(planar).all() and (np.linalg.eigvalsh(planar + planar.T) >= -1e-9).all():
+        symmetric: NDArray[np.float64] = 0.5 * (planar + planar.T)
+        return symmetric
+    raise InputError(
+        "The covariance of a pose is none: its 36 numbers must be finite, and no variance "
+        "negative. Look for the node that publishes it."
+    )
 
 
 def to_grid(message: Any) -> OccupancyGrid:

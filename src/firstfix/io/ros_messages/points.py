@@ -9,7 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.errors import ScanError
-from firstfix.core.points import points_from_depth
+from firstfix.core.points import DEFAULT_BAND_M, points_from_depth, scan_from_points
+from firstfix.core.scan import LaserScan
+
+# Nobody builds a depth camera that reaches farther.
+_DEPTH_RANGE_MAX_M = 10.0
 
 # sensor_msgs/PointField: FLOAT32 and FLOAT64.
 _FLOATS = {7: "f4", 8: "f8"}
@@ -110,6 +114,44 @@ def to_depth_points(image: Any, info: Any) -> tuple[NDArray[np.float32], tuple[f
     depth = np.ascontiguousarray(rows).view(pixel).astype(np.float32) * np.float32(unit)
     points = points_from_depth(depth.reshape(height, width), (fx, fy), (cx, cy))
     return points, (math.atan2(cx + 0.5, fx), math.atan2(width - 0.5 - cx, fx))
+
+
+def scan_from_depth(
+    image: Any,
+    info: Any,
+    T_base_sensor: NDArray[np.float64],
+    band: tuple[float, float] = DEFAULT_BAND_M,
+    stamp: float = 0.0,
+) -> LaserScan:
+    """Cut a depth image to a scan with the field of view of its camera.
+
+    Parameters
+    ----------
+    image, info : message
+        As in `to_depth_points`.
+    T_base_sensor : ndarray, shape (4, 4)
+        Pose of the optical frame in the base frame.
+    band : tuple of float
+        Lowest and highest height above the base frame, m.
+    stamp : float
+        Time of the scan, s.
+
+    Raises
+    ------
+    ScanError
+        If the image cannot be used.
+    """
+    points, (left, right) = to_depth_points(image, info)
+    # The optical axis in the base frame: z of the optical frame.
+    heading = math.atan2(T_base_sensor[1, 2], T_base_sensor[0, 2])
+    return scan_from_points(
+        points,
+        T_base_sensor,
+        band,
+        view=(heading - right, heading + left),
+        range_max=_DEPTH_RANGE_MAX_M,
+        stamp=stamp,
+    )
 
 
 def _rows(data: Any, height: int, row_step: int, row_bytes: int, what: str) -> NDArray[np.uint8]:

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from firstfix.core.odometry import Odometry
 from firstfix.core.se2 import SE2
@@ -41,7 +42,7 @@ class RobotFrames:
         # Separate: its frames need not agree with the tree of tf.
         self._topic = TransformBuffer()
         self._topic_child = base
-        self._last_scan_at = -math.inf
+        self._last_scan_at: defaultdict[str, float] = defaultdict(lambda: -math.inf)
         # Stamps of the last odometry that was returned, extrapolated or not, and measured.
         self._known_until = self._measured_until = -math.inf
         self._recent: tuple[Odometry, ...] = ()  # the last two that were measured
@@ -113,7 +114,7 @@ class RobotFrames:
         self._topic.add(odometry._replace(child=self._topic_child))
         return back
 
-    def clock_step_at_scan(self, stamp: float) -> float:
+    def clock_step_at_scan(self, stamp: float, frame: str = "") -> float:
         """Detect that the clock was set back by less than a second.
 
         One message may be reordered; odometry and scans that both go back are not.
@@ -122,6 +123,8 @@ class RobotFrames:
         ----------
         stamp : float
             Stamp of a scan, s.
+        frame : str
+            Frame of its sensor: scans of several sensors need not come in their order.
 
         Returns
         -------
@@ -129,7 +132,7 @@ class RobotFrames:
             How far scans went back, s; 0 if the clock was not set back. If it was, older motion is
             discarded: of two odometries with one stamp, either may be meant.
         """
-        back, self._last_scan_at = self._last_scan_at - stamp, stamp
+        back, self._last_scan_at[frame] = self._last_scan_at[frame] - stamp, stamp
         if back <= 0.0 or self._behind_s <= _BEHIND_S:
             return 0.0
         self._discard_motion()
@@ -179,8 +182,21 @@ class RobotFrames:
         self._known_until = stamp
         return [Odometry(stamp, last.T_odom_base @ moved)]
 
+    @property
+    def speed(self) -> tuple[float, float]:
+        """Of the last odometry, m/s and rad/s, both at least 0."""
+        if len(self._recent) < 2:
+            return 0.0, 0.0
+        before, last = self._recent
+        step, passed = before.T_odom_base.inverse() @ last.T_odom_base, last.stamp - before.stamp
+        return math.hypot(step.x, step.y) / passed, abs(step.yaw) / passed
+
+    def sensor_at(self, frame: str, stamp: float) -> NDArray[np.float64] | LookupFailure:
+        """Look up the pose of a sensor on the robot, shape (4, 4), at the stamp of its message."""
+        return self._tf.at(self._base, frame, stamp)
+
     def laser_at(self, frame: str, stamp: float) -> SensorPlace | LookupFailure:
-        """Look up the pose of a sensor on the robot.
+        """Look up the pose of a laser on the floor plan of the robot.
 
         Parameters
         ----------
@@ -199,7 +215,7 @@ class RobotFrames:
         ScanError
             If its scan plane is not level.
         """
-        T_base_laser = self._tf.at(self._base, frame, stamp)
+        T_base_laser = self.sensor_at(frame, stamp)
         if isinstance(T_base_laser, LookupFailure):
             return T_base_laser
         return place_of(frame, T_base_laser)

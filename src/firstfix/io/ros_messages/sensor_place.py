@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.errors import ScanError
+from firstfix.core.points import pose_matrix
 from firstfix.core.scan import Mounting
 from firstfix.core.se2 import SE2
 from firstfix.io.ros_messages.transforms import flat
@@ -70,6 +71,48 @@ def place_of(frame: str, T_base_laser: NDArray[np.float64]) -> SensorPlace:
         notes = (f"{frame} is tilted by {math.degrees(tilt):.0f}°, which was ignored",)
     mounting = Mounting.UPRIGHT if up > 0.0 else Mounting.UPSIDE_DOWN
     return SensorPlace(flat(T_base_laser), mounting, notes)
+
+
+def given_poses(text: str) -> dict[str, NDArray[np.float64]]:
+    """Read the poses of sensors that a person gives in place of transforms.
+
+    Parameters
+    ----------
+    text : str
+        One or several, separated by spaces: ``X,Y,YAW``, ``X,Y,YAW,ROLL`` or
+        ``X,Y,Z,ROLL,PITCH,YAW`` (m, rad), each perhaps behind ``frame=``. A roll of 3.14 is upside
+        down.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (4, 4)
+        By frame; an empty frame stands for all others.
+
+    Raises
+    ------
+    ScanError
+        If one is no pose, or a laser is not level.
+    """
+    poses: dict[str, NDArray[np.float64]] = {}
+    for part in text.split():
+        frame, _, numbers = part.rpartition("=")
+        try:
+            values = [float(number) for number in numbers.split(",")]
+        except ValueError:
+            values = []
+        if len(values) not in (3, 4, 6) or not all(map(math.isfinite, values)):
+            raise ScanError(
+                f"laser_pose {part} is not a pose. Write X,Y,YAW or X,Y,YAW,ROLL in metres and "
+                "radians, such as 0.2,0,1.57, or X,Y,Z,ROLL,PITCH,YAW; for one of several sensors "
+                "like front_laser=0.2,0,1.57."
+            )
+        if len(values) < 6:
+            x, y, yaw, roll = (*values, 0.0)[:4]
+            values = [x, y, 0.0, roll, 0.0, yaw]
+        poses[frame] = pose_matrix(values)
+        if len(numbers.split(",")) < 6:
+            place_of(frame or "laser_pose", poses[frame])
+    return poses
 
 
 def unknown_place(frame: str) -> SensorPlace:

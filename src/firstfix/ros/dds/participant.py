@@ -14,7 +14,7 @@ from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.qos import Policy, Qos
 
 from firstfix.core.errors import InputError
-from firstfix.ros.channels import PARTICLES, Channel, Topic, published_topics, subscribed_topics
+from firstfix.ros.channels import PARTICLES, Channel, Topic, published_topics, subscriptions
 from firstfix.ros.dds.domain import DomainSettings, domain_settings
 from firstfix.ros.dds.endpoints import EventThread, Receiver, Sender
 from firstfix.ros.dds.graph import GRAPH, USER_DATA, entities
@@ -53,7 +53,7 @@ class Dds:
         self._config = config
         self._names = names
         self._threads: list[EventThread] = []
-        self._receivers: dict[Channel, Receiver] = {}
+        self._receivers: list[tuple[Channel, Receiver]] = []
         try:
             self._domain = Domain(domain.number, domain.configuration)
             self._participant = DomainParticipant(domain.number, Qos(Policy.Userdata(USER_DATA)))
@@ -69,17 +69,17 @@ class Dds:
     def connect(self, node: Node) -> None:
         """Subscribe, and publish the entry in the ROS graph."""
         self._node = node
-        self._receivers = {
-            channel: Receiver(self._participant, topic, self._dds_name(topic))
-            for channel, topic in subscribed_topics(self._config).items()
-        }
-        conditions = [receiver.news for receiver in self._receivers.values()]
+        self._receivers = [
+            (channel, Receiver(self._participant, topic, self._dds_name(topic)))
+            for channel, topic in subscriptions(self._config)
+        ]
+        conditions = [receiver.news for _, receiver in self._receivers]
         ends = [end.entity for end in self._ends]
         self._threads = [
             EventThread(self._participant, conditions, self._receive, node.warn_throttled),
             EventThread(self._participant, ends, self._check_matches, node.warn_throttled),
         ]
-        readers = [receiver.entity for receiver in self._receivers.values()]
+        readers = [receiver.entity for _, receiver in self._receivers]
         writers = [sender.entity for sender in self._senders.values()]
         place = self._names.namespace, self._names.node
         self._graph = Sender(self._participant, GRAPH, GRAPH.name)
@@ -114,10 +114,10 @@ class Dds:
 
     @property
     def _ends(self) -> list[Sender | Receiver]:
-        return [*self._senders.values(), *self._receivers.values()]
+        return [*self._senders.values(), *(receiver for _, receiver in self._receivers)]
 
     def _receive(self) -> None:
-        for channel, receiver in self._receivers.items():
+        for channel, receiver in self._receivers:
             for data in receiver.take():
                 self._pass_on(channel, receiver, data)
 

@@ -17,7 +17,7 @@ from firstfix.ros.channels import (
     Delivery,
     Topic,
     published_topics,
-    subscribed_topics,
+    subscriptions,
 )
 from firstfix.ros.node import MakeNode, Node
 from firstfix.ros.node_config import NodeConfig
@@ -98,11 +98,11 @@ def run(arguments: list[str], make_node: MakeNode = Node) -> None:
     config = configured(values)
     node = make_node(config, Ros1(config))
     node.start()
-    topics = subscribed_topics(config)
-    if not uses_topic and topics.pop(Channel.MAP, None) is not None:
-        threading.Thread(target=_ask_for_map, args=(node,), daemon=True).start()
-    for channel, topic in topics.items():
-        _subscribe(topic, partial(node.receive, channel))
+    for channel, topic in subscriptions(config):
+        if channel is Channel.MAP and not uses_topic:
+            threading.Thread(target=_ask_for_map, args=(node,), daemon=True).start()
+        else:
+            _subscribe(topic, partial(node.receive, channel))
     _spin([_offer(node, service) for service in ros1_services(config)])
     node.stop()
 

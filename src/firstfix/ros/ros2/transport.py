@@ -20,7 +20,7 @@ from firstfix.ros.channels import (
     Delivery,
     Topic,
     published_topics,
-    subscribed_topics,
+    subscriptions,
 )
 from firstfix.ros.node import Node
 from firstfix.ros.node_config import NodeConfig
@@ -83,7 +83,7 @@ class Ros2:
         node.start()
         self._node = node
         self.deactivate()
-        for channel, topic in subscribed_topics(self._config).items():
+        for channel, topic in subscriptions(self._config):
             if (kind := self._find("msg", topic.type_name, topic.name)) is not None:
                 receive = partial(self._receive, node, channel, topic)
                 made = self._owner.create_subscription(kind, topic.name, receive, quality(topic))
