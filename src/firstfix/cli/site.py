@@ -13,10 +13,12 @@ from firstfix.cli.sensor_options import BaseFrame, LaserFrame, LaserPose, Topics
 from firstfix.core.errors import ScanError
 
 if TYPE_CHECKING:
+    from firstfix.lab.experiments.site_check import SiteCheck
     from firstfix.site.result import SiteResult
     from firstfix.site.site import Site
 
 NO_ANSWER = 1
+MOST_PAIRS = 10
 
 site_app = typer.Typer(help="Many maps: which map, and where in it.", no_args_is_help=True)
 
@@ -69,6 +71,69 @@ def locate(
         typer.echo(f"picture: {plot}", err=True)
     if result.verdict is not Verdict.UNIQUE:
         raise typer.Exit(NO_ANSWER)
+
+
+@site_app.command()
+def check(
+    site_path: SitePath,
+    samples: Annotated[
+        int, typer.Option(min=0, max=10_000, help="Simulated scans in each map; 0 for none.")
+    ] = 3,
+    seed: Annotated[int, typer.Option(min=0, help="Of the places and the noise.")] = 0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw which maps look alike.")
+    ] = None,
+) -> None:
+    """Prepare all maps, and tell which are copies or look alike, and what a scan costs.
+
+    A simulated sensor takes scans at random places of each map, and each scan is located in the
+    whole site.
+    """
+    from firstfix.lab.experiments.site_check import check_site
+
+    if plot is not None:
+        from firstfix.lab.reports.output_files import check_picture
+
+        check_picture(plot)
+    site = _load(site_path)
+    steps = len(site.maps) * (2 if samples else 1)
+    with progress(steps, "checking maps") as done:
+        found = check_site(site, samples, seed, done)
+    if as_json:
+        typer.echo(json.dumps(found.to_dict(), allow_nan=False))
+    else:
+        for line in _check_lines(found):
+            typer.echo(line)
+    if plot is not None:
+        from firstfix.lab.reports.site_picture import draw_site
+
+        typer.echo(f"picture: {draw_site(found, plot)}", err=True)
+
+
+def _check_lines(found: SiteCheck) -> list[str]:
+    area = sum(one.area_m2 for one in found.maps)
+    scans = sum(one.scans for one in found.maps)
+    right = sum(one.right for one in found.maps)
+    lines = [
+        f"maps          {len(found.maps)} usable, {len(found.faults)} not, {area:,.0f} m² free",
+        f"memory        {found.nbytes / 1e6:,.0f} MB if all maps are in use",
+        f"preparation   {found.prepare_s:.1f} s; files are kept for the next time",
+    ]
+    if scans:
+        lines += [
+            f"a scan        {found.query_s:.2f} s of processor time",
+            f"right map     {right / scans:.1%} of {scans} simulated scans",
+            f"UNIQUE        {found.unique / scans:.1%}, of which {found.wrong} in a wrong map",
+        ]
+    lines += [f"copies        {', '.join(names)}" for names in found.copies]
+    lines += [f"warning: {fault}" for fault in found.faults]
+    if found.alike:
+        lines += ["", "Maps that look alike, and scans of the first that fit in the second, too:"]
+    lines += [f"{pair.map_id}  ~  {pair.other}  {pair.scans}" for pair in found.alike[:MOST_PAIRS]]
+    if len(found.alike) > MOST_PAIRS:
+        lines.append(f"and {len(found.alike) - MOST_PAIRS} more (--json lists all)")
+    return lines
 
 
 def _load(path: Path) -> Site:

@@ -31,6 +31,9 @@ from firstfix.site.views import search_views
 MEMORY_LIMIT = 2 << 30
 """Default size of the prepared maps that are held at once, bytes."""
 
+FIELDS = ("squares", "clearance", "endpoints", "ranges")
+"""What the search reads of a prepared map."""
+
 # Places that may turn out to be one: only of these the surroundings are compared.
 LIKELY_PLACES = 6
 LIKELY_SHARE = 1e-3
@@ -129,6 +132,10 @@ class Site:
         """
         return self._maps.get(map_id).fields
 
+    def content(self, map_id: str) -> str:
+        """Return a hash of a map: copies have the same."""
+        return self._maps.get(map_id).content
+
     def grid(self, map_id: str) -> OccupancyGrid:
         """Return a map."""
         return self.fields(map_id).grid
@@ -143,7 +150,7 @@ class Site:
         """
         for entry in self._entries.values():
             if self._is_usable(entry):
-                self.fields(entry.id).compute("squares", "clearance", "endpoints", "ranges")
+                self.fields(entry.id).compute(*FIELDS)
             done(entry.id)
         if self._cache_dir is not None:
             remove_unused(self._cache_dir, UNUSED_DAYS)
