@@ -107,6 +107,32 @@ def test_map_check_names_the_places_that_look_alike(cli, alike: Files) -> None:
         assert there[-1] == "50.0%"
 
 
+def test_map_check_predicts_what_sensors_can_do(cli, unique: Files, tmp_path: Path) -> None:
+    ended = cli(
+        "map", "check", unique[0], "--samples", 2, "--sensor", "360,8", "--sensor", "two-lasers",
+        "--plot", "heat.png",
+    )  # fmt: skip
+    assert ended.status == 0, ended
+    assert "360° x 8 m, at 2 random places (seed 0)" in ended.out
+    assert "two lasers, 270° x 8 m each, at 2 random places" in ended.out
+    assert ended.out.count("one turn in place") == 2
+    assert (tmp_path / "heat.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (["--sensor", "60"], "no sensor"),
+        (["--sensor", "60,5", "--samples", 0], "needs places"),
+        (["--plot", "heat.doc"], ".png"),
+    ],
+)
+def test_map_check_refuses(cli, unique: Files, options: list[str], word: str) -> None:
+    ended = cli("map", "check", unique[0], *options)
+    assert ended.status == 2
+    assert word in ended.err
+
+
 def test_map_check_asks_before_it_works_long(
     cli, unique: Files, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -54,6 +54,18 @@ Reach = Annotated[
         "--range", metavar="METRES", min=0.5, max=1000, help="Range.", rich_help_panel=PANEL
     ),
 ]
+PREDICTION = "Prediction: what a sensor can do in this map"
+Sensors = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--sensor",
+        metavar="SENSOR",
+        help="FOV,RANGE (degrees, m), 2xFOV,RANGE for two lasers at opposite corners, two-lasers, "
+        "depth-camera or 3d-lidar; repeatable. Predicts how often one scan, one turn in place, "
+        "and one metre of driving are enough.",
+        rich_help_panel=PREDICTION,
+    ),
+]
 Seed = Annotated[
     int, typer.Option(min=0, help="Of the places and the noise.", rich_help_panel=PANEL)
 ]
@@ -67,22 +79,42 @@ def check(
     fov: Fov = 360.0,
     reach: Reach = 12.0,
     seed: Seed = 0,
+    sensors: Sensors = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Draw heat maps over the floor: where one scan, one turn, one metre are enough.",
+            rich_help_panel=PREDICTION,
+        ),
+    ] = None,
 ) -> None:
     """Load a map as map_server does: print its size, warn of traps, find places that look alike.
 
     A simulated sensor takes one scan at random places, and each scan is located in the whole map.
+    With --sensor or --plot the robot also turns and drives where one scan is not enough.
     """
+    from firstfix.cli.map_prediction import print_predictions
     from firstfix.io.maps.check import check_map
     from firstfix.io.maps.map_server import load_map
     from firstfix.lab.experiments.perceptual_aliasing import sensor
+    from firstfix.lab.reports.output_files import check_picture
+    from firstfix.lab.simulation.rigs import Rig, parse_rig
 
+    rigs = [parse_rig(text) for text in sensors or []]
+    if plot is not None:
+        check_picture(plot)
+        rigs = rigs or [Rig((sensor(beams, fov, reach),), f"{fov:g}° x {reach:g} m")]
     found = check_map(map_path)
     _print_sizes(found)
     for warning in found.warnings:
         typer.echo(f"warning: {warning}")
     if not found.warnings:
         typer.echo("no traps found")
-    if samples != 0:
+    if rigs:
+        samples = SAMPLES if samples is None else samples
+        print_predictions(load_map(map_path), rigs, samples, seed, plot)
+    elif samples != 0:
         _print_aliasing(load_map(map_path), sensor(beams, fov, reach), samples, seed)
 
 
@@ -177,7 +209,13 @@ def _lines(places: Sequence[Place]) -> list[str]:
     from firstfix.lab.experiments.perceptual_aliasing import Look, doubles, share
     from firstfix.lab.reports.text import pose_text
 
-    lines = [f"{look.value:<18}{share(places, look):6.1%}" for look in Look]
+    meaning = {
+        Look.FOUND: "the scan fits where it was taken, and nowhere else as well",
+        Look.AMBIGUOUS: "it fits elsewhere, too: rooms look alike, or the range is too short",
+        Look.LOST: "too few beams hit: the range is too short, or free cells are outdoors",
+        Look.MISTAKEN: "another place fits better",
+    }
+    lines = [f"{look.value:<18}{share(places, look):6.1%}  {meaning[look]}" for look in Look]
     if any(place.needs_second_view for place in places):
         lines.append(
             "One scan of this sensor is never UNIQUE: it sees too little. The robot publishes a "

@@ -7,7 +7,7 @@ from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.lab.simulation.lidar import Lidar, NoReturn
-from firstfix.lab.simulation.rigs import RIGS, Rig, find_rig
+from firstfix.lab.simulation.rigs import RIGS, Rig, find_rig, parse_rig
 
 
 @pytest.fixture
@@ -51,3 +51,19 @@ def test_unknown_names_and_no_sensor_are_refused() -> None:
         find_rig("two-laser")
     with pytest.raises(InputError, match="without a sensor"):
         Rig(())
+
+
+def test_sensors_are_read_from_text() -> None:
+    (lidar,) = parse_rig("60,5").lidars
+    assert (lidar.beams, lidar.range_max) == (61, 5.0)
+    assert parse_rig("60,5").words == "60° x 5 m"
+    front, rear = parse_rig("2x270,8").lidars
+    assert (front.beams, rear.range_max) == (271, 8.0)
+    assert front.T_base_laser != rear.T_base_laser
+    assert parse_rig("depth-camera") is RIGS["depth-camera"]
+
+
+@pytest.mark.parametrize("text", ["", "60", "60,5,3", "0,5", "400,5", "60,nan", "3x60,5", "x60,5"])
+def test_other_text_is_no_sensor(text: str) -> None:
+    with pytest.raises(InputError, match="sensor"):
+        parse_rig(text)

@@ -102,3 +102,34 @@ def find_rig(name: str) -> Rig:
     near = difflib.get_close_matches(name, RIGS, 1)
     hint = f" Did you mean {near[0]}?" if near else ""
     raise InputError(f"There is no sensor {name!r:.40}. Choose one of {', '.join(RIGS)}.{hint}")
+
+
+def parse_rig(text: str) -> Rig:
+    """Read sensors: a name, ``FOV,RANGE`` (degrees, m), or ``2xFOV,RANGE`` for two at the corners.
+
+    Raises
+    ------
+    InputError
+        If it is none of these.
+    """
+    count, times, numbers = text.rpartition("x")
+    try:
+        fov_deg, range_max = (float(part) for part in numbers.split(","))
+    except ValueError:
+        return find_rig(text)
+    if count + times not in ("", "2x") or not (
+        1.0 <= fov_deg <= 360.0 and 0.5 <= range_max <= 1000.0
+    ):
+        raise InputError(
+            f"{text!r:.40} is no sensor. Write FOV,RANGE with 1 to 360 degrees and 0.5 to 1000 m, "
+            f"2xFOV,RANGE for two at opposite corners, or one of {', '.join(RIGS)}."
+        )
+    beams = round(fov_deg) + (fov_deg < 360.0)  # one a degree
+    lidar = replace(_USUAL, beams=beams, fov=math.radians(fov_deg), range_max=range_max)
+    words = f"{fov_deg:g}° x {range_max:g} m"
+    if count == "":
+        return Rig((lidar,), words)
+    places = [corner.T_base_laser for corner in RIGS["two-lasers"].lidars]
+    return Rig(
+        tuple(replace(lidar, T_base_laser=place) for place in places), f"two lasers, {words} each"
+    )
