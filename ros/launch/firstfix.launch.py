@@ -17,8 +17,8 @@ ARGUMENTS = (
     ("params_file", str(PARAMETERS), "file of parameters"),
     ("namespace", "", "namespace of the robot"),
     ("mode", "", "bootstrap: an AMCL runs beside; full: firstfix is the AMCL"),
-    ("map", "", "YAML of the map; empty: hear it on the topic map"),
-    ("use_sim_time", "false", "whether a simulator or a bag gives the time"),
+    ("map", "", "YAML of the map; empty: from the topic map"),
+    ("use_sim_time", "false", "whether a simulator or a bag provides the time"),
     ("autostart", "true", "whether the node is its own lifecycle manager"),
 )
 

@@ -36,7 +36,7 @@ def test_defaults_are_those_of_the_node() -> None:
 def test_sentences_are_those_of_the_node() -> None:
     code = "".join(path.read_text() for path in (ROOT / "src" / "firstfix").rglob("*.py"))
     code = re.sub(r'"\s*f?"', "", code)
-    for sentence, _ in table("What the node complains of"):
+    for sentence, _ in table("Warnings of the node"):
         words = sentence.strip("`").split("; ")
         for part in words:
             # What stands at the ends is put in by the code.
@@ -87,6 +87,11 @@ def test_arguments_of_the_example_are_right(line: str) -> None:
 
 
 def test_what_is_started_is_in_the_package() -> None:
-    for name in ("firstfix.launch.py", "firstfix_node", "config/firstfix.yaml"):
+    for name in (
+        "bootstrap.launch.py",
+        "simulation.launch.py",
+        "firstfix_node",
+        "config/firstfix.yaml",
+    ):
         assert name in PAGE
         assert list((ROOT / "ros").rglob(Path(name).name))

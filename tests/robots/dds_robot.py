@@ -66,7 +66,7 @@ def main() -> None:
         writers[topic].write(Cdr(encode(TYPES[topic], message)))
 
     grid, scenario, seed = SCRIPTS[options.script]()
-    T_base_laser = scenario.lidar.T_base_laser
+    T_base_laser = scenario.rig.lidars[0].T_base_laser
     publish("/tf_static", transforms(make, 0.0, BASE, LASER, T_base_laser))
     if options.map == "late":
         time.sleep(2.0)

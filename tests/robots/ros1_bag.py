@@ -52,7 +52,9 @@ def record(path: Path, script: str, seconds: float, began: float) -> SE2:
             ns = round(1e9 * now)
             writer.write(connections[topic], ns, STORE.serialize_ros1(message, TYPES[topic]))
 
-        publish("/tf_static", transforms(make, now, BASE, LASER, scenario.lidar.T_base_laser))
+        publish(
+            "/tf_static", transforms(make, now, BASE, LASER, scenario.rig.lidars[0].T_base_laser)
+        )
         publish("map", occupancy_grid(make, now, "map", grid))
         moments = takewhile(lambda moment: moment.stamp < seconds, run(scenario, grid, seed))
         first = next(moments)

@@ -171,7 +171,7 @@ def main() -> None:
     arguments = parser.parse_args()
     rospy.init_node("robot", anonymous=True)
     grid, scenario, seed = SCRIPTS[arguments.script]()
-    robot = Robot(grid, scenario.lidar.T_base_laser, arguments.flaws)
+    robot = Robot(grid, scenario.rig.lidars[0].T_base_laser, arguments.flaws)
     if arguments.serve_map:
         rospy.Service("static_map", nav_msgs.srv.GetMap, lambda _: robot.map())
     robot.publish_latched()

@@ -330,6 +330,7 @@ def test_without_scans_the_status_is_stale_with_the_reason_and_the_robot_not_loc
     _, stale = recorder.on(STATUS)
     assert stale.status[0].level == 3
     assert stale.status[0].message == "STALE: no scan for 2.5 s; the state was LOCALIZED"
+    assert status_values(stale)["state"] == "STALE"
     assert to_seconds(stale.header.stamp) == 12.5
     assert [message.data for message in recorder.on(LOCALIZED)] == [True, False]
     publisher.publish(tracked(12.6), None)

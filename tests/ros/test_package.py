@@ -12,6 +12,7 @@ import sysconfig
 import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -32,6 +33,8 @@ else:
 
 ROOT = Path(__file__).parents[2]
 ROS = ROOT / "ros"
+# Parameters of the node of rclpy only.
+RCLPY_ONLY = ("autostart", "use_sim_time")
 
 
 def load(path: Path) -> ModuleType:
@@ -136,12 +139,18 @@ def test_the_file_of_parameters_has_all_of_them_with_their_defaults() -> None:
 def launch_file(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
     """Give what loads a launch file; dictionaries stand in for launch, which PyPI does not have."""
     names = ["launch", "launch.actions", "launch.substitutions", "launch_ros", "launch_ros.actions"]
-    for name in [*names, "nav2_common", "nav2_common.launch"]:
+    names += ["launch.launch_description_sources", "nav2_common", "nav2_common.launch"]
+    for name in names:
         monkeypatch.setitem(sys.modules, name, ModuleType(name))
     sys.modules["launch"].LaunchDescription = list
     actions = sys.modules["launch.actions"]
     actions.DeclareLaunchArgument = lambda name, default_value, description: (name, default_value)
     actions.OpaqueFunction = lambda function: function
+    actions.IncludeLaunchDescription = lambda source, launch_arguments: partial(
+        included, load(Path(source)), dict(launch_arguments)
+    )
+    sources = sys.modules["launch.launch_description_sources"]
+    sources.PythonLaunchDescriptionSource = str
     sys.modules["launch.substitutions"].LaunchConfiguration = lambda name: SimpleNamespace(
         perform=lambda context: context[name]
     )
@@ -149,6 +158,14 @@ def launch_file(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
     sys.modules["nav2_common.launch"].RewrittenYaml = lambda **given: given
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     return lambda name: load(ROS / "launch" / name)
+
+
+def included(file: ModuleType, given: dict, context: dict[str, str]) -> list[dict]:
+    """Launch an included file: it sees all arguments of the command line, as in launch."""
+    passed = {name: value.perform(context) for name, value in given.items()}
+    *declared, start = file.generate_launch_description()
+    assert set(passed) <= set(dict(declared))
+    return start(dict(declared) | context | passed)
 
 
 def launched(file: ModuleType, **asked: str) -> list[dict]:
@@ -177,6 +194,24 @@ def test_launched_with_arguments_it_passes_on_what_was_asked(launch_file: Callab
     assert node["namespace"] == "robot1"
 
 
+@pytest.mark.parametrize(
+    ("name", "given", "expected"),
+    [
+        ("bootstrap", {}, {"mode": "bootstrap"}),
+        ("simulation", {"mode": "full"}, {"mode": "full", "use_sim_time": True}),
+        ("namespace", {"namespace": "robot2"}, {"mode": "bootstrap"}),
+    ],
+)
+def test_robots_of_each_kind_have_a_launch_file(
+    launch_file: Callable, name: str, given: dict, expected: dict
+) -> None:
+    (node,) = launched(launch_file(f"{name}.launch.py"), **given)
+    asked = node["parameters"][1]
+    assert asked == {"use_sim_time": False, "autostart": True} | expected
+    configured({key: value for key, value in asked.items() if key not in RCLPY_ONLY})
+    assert node["namespace"] == given.get("namespace", "")
+
+
 def test_nav2s_localization_is_replaced_under_its_own_names(launch_file: Callable) -> None:
     """So that a stock bringup and nav2_params.yaml stay as they are, but for the file included."""
     given = {"map": "map.yaml", "params_file": "nav2_params.yaml", "namespace": "robot1"}
@@ -197,6 +232,22 @@ def test_the_launch_file_of_a_kobuki_remaps_topics_of_the_node() -> None:
     remapped = {rule.get("from"): rule.get("to") for rule in launch.iter("remap")}
     assert set(remapped) == {name for name in names if name.startswith("events/")}
     assert all(new == f"mobile_base/{old}" for old, new in remapped.items())
+
+
+def test_launch_files_of_ros_1_set_parameters_and_arguments_that_exist() -> None:
+    known = {parameter.name for parameter in parameters()} | {"use_map_topic"}
+    main = ET.parse(ROS / "ros1" / "firstfix.launch").getroot()  # noqa: S314 - our own file
+    arguments = {argument.get("name") for argument in main.findall("arg")}
+    assert {parameter.get("name") for parameter in main.iter("param")} <= known
+    for file in (ROS / "ros1").glob("*.launch"):
+        launch = ET.parse(file).getroot()  # noqa: S314 - our own file
+        declared = {argument.get("name") for argument in launch.findall("arg")}
+        for include in launch.iter("include"):
+            assert include.get("file") == "$(dirname)/firstfix.launch"
+            for passed in include.findall("arg"):
+                assert passed.get("name") in arguments
+                assert passed.get("value") == f"$(arg {passed.get('name')})"
+                assert passed.get("name") in declared
 
 
 def test_viewers_are_set_up_for_the_topics_of_the_node() -> None:

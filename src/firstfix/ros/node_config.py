@@ -97,7 +97,7 @@ class NodeConfig:
     tf_broadcast: bool = setting(True, "publish map -> odom")
     cloud_rate: float = setting(2.0, "maximum rate of particle_cloud, Hz; 0: none", 0.0, 100.0)
     status_rate: float = setting(
-        2.0, "maximum rate of localization_status while the state stays the same, Hz", 0.1, 1e3
+        1.0, "maximum rate of localization_status while the state stays the same, Hz", 0.1, 1e3
     )
     scan_timeout: float = setting(
         2.0, "time without a scan after which localization_status is stale, s; 0: never", 0.0

@@ -192,13 +192,14 @@ class OutputPublisher:
         text = f"STALE: no scan for {silence_s:.1f} s; the state was {self._status.state.value}"
         later = replace(self._status, stamp=self._status.stamp + silence_s)
         self._transport.log(Severity.WARNING, text)
-        self._send_status(later, Level.STALE, text)
+        self._send_status(later, Level.STALE, text, state="STALE")
         self._send_localized(is_localized=False)
         self._status = None  # the next one is published, whatever its state
 
-    def _send_status(self, status: Status, level: Level, text: str) -> None:
+    def _send_status(self, status: Status, level: Level, text: str, state: str = "") -> None:
         make, stamp = self._transport.make, self._stamps.exact(status.stamp)
         name, values = "firstfix: localization", self._values(status)
+        values["state"] = state or status.state.value
         self._transport.publish(STATUS, diagnostics(make, stamp, name, level, text, values))
 
     def _send_localized(self, *, is_localized: bool) -> None:
@@ -208,7 +209,7 @@ class OutputPublisher:
             self._transport.publish(LOCALIZED, message)
 
     def _values(self, status: Status) -> dict[str, str]:
-        values = {"state": status.state.value, "mode": self._config.mode.value}
+        values = {"state": "", "mode": self._config.mode.value}
         values["hypotheses"] = str(len(self._places))
         if (evidence := status.evidence) is not None:
             for name in ("explained", "short", "through_wall", "unknown"):

@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from ros1_lab import Lab, wait_until
 
+from firstfix.ros.parameters import parameters
+
 pytestmark = pytest.mark.slow
 
 ROS = Path(__file__).parents[3] / "ros"
@@ -33,6 +35,16 @@ def prefix(tmp_path: Path) -> Path:
     command.write_text(f'#!/bin/sh\nexec {sys.executable} -m firstfix "$@"\n')
     command.chmod(0o755)
     return prefix
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in (ROS / "ros1").glob("*.launch")))
+def test_roslaunch_reads_it(ros1: Lab, name: str) -> None:
+    launch = ros1.start("roslaunch", "--dump-params", ROS / "ros1" / name)
+    assert launch.wait() == 0, launch.output
+    found = {line.partition(":")[0].strip() for line in launch.output.splitlines() if ":" in line}
+    known = {f"/firstfix/{parameter.name}" for parameter in parameters()}
+    assert {"/firstfix/mode", "/firstfix/scan_topic"} <= found
+    assert found <= known | {"/firstfix/use_map_topic"}
 
 
 def test_the_launch_file_starts_a_node_and_starts_it_again(ros1: Lab, prefix: Path) -> None:
