@@ -18,6 +18,7 @@ ARGUMENTS = (
     ("namespace", "", "namespace of the robot"),
     ("mode", "", "bootstrap: an AMCL runs beside; full: firstfix is the AMCL"),
     ("map", "", "YAML of the map; empty: from the topic map"),
+    ("scan_topics", "", "topics of several lasers, with spaces between them; empty: one, scan"),
     ("use_sim_time", "false", "whether a simulator or a bag provides the time"),
     ("autostart", "true", "whether the node is its own lifecycle manager"),
 )
@@ -36,8 +37,7 @@ def start(context):
     """Return the node, with the parameters that were asked for."""
     given = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
     asked = {name: given[name].lower() == "true" for name in ("use_sim_time", "autostart")}
-    if given["mode"]:
-        asked["mode"] = given["mode"]
+    asked |= {name: given[name] for name in ("mode", "scan_topics") if given[name]}
     if given["map"]:
         asked["yaml_filename"] = str(Path(given["map"]).absolute())
     node = Node(

@@ -200,6 +200,8 @@ def test_launched_with_arguments_it_passes_on_what_was_asked(launch_file: Callab
         ("bootstrap", {}, {"mode": "bootstrap"}),
         ("simulation", {"mode": "full"}, {"mode": "full", "use_sim_time": True}),
         ("namespace", {"namespace": "robot2"}, {"mode": "bootstrap"}),
+        ("two_lasers", {}, {"mode": "bootstrap", "scan_topics": "front/scan rear/scan"}),
+        ("two_lasers", {"scan_topics": "a b c"}, {"mode": "bootstrap", "scan_topics": "a b c"}),
     ],
 )
 def test_robots_of_each_kind_have_a_launch_file(

@@ -40,6 +40,7 @@ START = {
 EFFECTS: dict[str, dict[str, Any]] = {
     "mode": {"to": "bootstrap"},
     "yaml_filename": {"to": "map.yaml"},
+    "map_id": {"to": "lobby"},
     "base_frame_id": {"to": "base_link"},
     "odom_frame_id": {"to": "wheels"},
     "global_frame_id": {"to": "floor"},
