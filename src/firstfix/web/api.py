@@ -13,6 +13,7 @@ from starlette.routing import Route
 
 from firstfix.web.broadcaster import Broadcaster
 from firstfix.web.commands import Command, Pose, Relocalize, SetPose
+from firstfix.web.dropped_files import DroppedFiles
 from firstfix.web.json_decoding import decode
 from firstfix.web.locate_queue import LocateQueue
 from firstfix.web.map_png import LEAST_PIXELS, MOST_PIXELS, cells_per_pixel
@@ -39,6 +40,7 @@ class Api:
         self._page = page
         self._broadcaster = broadcaster
         self._queue = LocateQueue()
+        self._dropped_files = DroppedFiles()
         self._document = msgspec.json.encode(document())
 
     def routes(self) -> list[Route]:
@@ -48,6 +50,7 @@ class Api:
             Route("/v1/map", self.map),
             Route("/v1/map.png", self.map_png),
             Route("/v1/locate", self.locate, methods=["POST"]),
+            Route("/v1/locate-files", self.locate_files, methods=["POST"]),
             Route("/v1/pose", self.pose, methods=["POST"]),
             Route("/v1/relocalize", self.relocalize, methods=["POST"]),
             Route("/openapi.json", self.openapi),
@@ -77,6 +80,12 @@ class Api:
         body = await read_body(request)
         map_name = request.query_params.get("map")
         return _json(await self._queue.locate(body, kind, map_name, active_map))
+
+    async def locate_files(self, request: Request) -> Response:
+        """Search a scan of a viewer's log in a viewer's map."""
+        media_type(request, NPZ)
+        answer = await self._dropped_files.locate(request, self._page.store.snapshot.map)
+        return Response(answer, 200, {"cache-control": "no-store"}, JSON)
 
     async def pose(self, request: Request) -> Response:
         """Take a pose hint."""

@@ -218,6 +218,19 @@ class Answer(Struct, frozen=True):
     error: None
 
 
+class LocatedFiles(Struct, frozen=True):
+    """The answer of `POST /v1/locate-files`."""
+
+    map: Map
+    png: Annotated[str, Meta(description="the map as in GET /v1/map.png, base64")]
+    log: Annotated[str, Meta(description="name of the log")]
+    scans: Annotated[Count, Meta(description="scans that index can choose")]
+    notes: Annotated[list[str], Meta(description="assumptions of the reader")]
+    ends: Annotated[list[tuple[float, float]], Meta(description="of the beams, map frame, m")]
+    classes: Annotated[list[Count], Meta(description="of the beams, as in binary kind 1")]
+    answer: Answer
+
+
 def as_tuple(pose: SE2) -> tuple[float, float, float]:
     """Write a pose as x (m), y (m), yaw (rad)."""
     return pose.x, pose.y, pose.yaw

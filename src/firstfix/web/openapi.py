@@ -8,15 +8,16 @@ import msgspec
 
 from firstfix import __version__
 from firstfix.web.commands import Pose
+from firstfix.web.dropped_files import MOST_FILES
 from firstfix.web.locate_queue import Scan
 from firstfix.web.map_png import LEAST_PIXELS, MOST_PIXELS
-from firstfix.web.messages import Accepted, Answer, Map, Status
+from firstfix.web.messages import Accepted, Answer, LocatedFiles, Map, Status
 from firstfix.web.problem_details import MEDIA_TYPE, Problem
 from firstfix.web.request_body import JSON, NPZ
 
 Schema = dict[str, Any]
 
-_STRUCTS = (Pose, Scan, Accepted, Answer, Map, Status, Problem)
+_STRUCTS = (Pose, Scan, Accepted, Answer, LocatedFiles, Map, Status, Problem)
 # Refusals of requests with a body.
 _BODY = (400, 408, 413, 415, 422)
 
@@ -66,6 +67,15 @@ def _paths() -> Schema:
             "post": _operation("Search one scan in the map", _json(Answer), *_BODY, 404, 503)
             | {"parameters": [map_name], "requestBody": {"required": True, "content": scan_body}}
         },
+        "/v1/locate-files": {
+            "post": _operation(
+                "Search a scan of a log in a map, both in the body",
+                _json(LocatedFiles),
+                *_BODY,
+                503,
+            )
+            | {"parameters": _file_parameters(), "requestBody": _files_body()}
+        },
         "/v1/pose": {
             "post": _operation("Set a pose hint", _json(Accepted), *_BODY, 403, 503, success=202)
             | {"requestBody": {"required": True, "content": _json(Pose)}}
@@ -79,6 +89,20 @@ def _paths() -> Schema:
             "get": _operation("This document", {JSON: {"schema": {"type": "object"}}})
         },
     }
+
+
+def _file_parameters() -> list[Schema]:
+    files = _query("file", "NAME:BYTES of each file, in the order of the body")
+    files |= {"required": True, "explode": True}
+    files["schema"] = {"type": "array", "items": {"type": "string"}, "maxItems": MOST_FILES}
+    index = _query("index", "which scan of the log")
+    index["schema"] = {"type": "integer", "minimum": 0, "maximum": 999_999, "default": 0}
+    return [files, index]
+
+
+def _files_body() -> Schema:
+    content = {NPZ: {"schema": {"description": "the files, one after another"}}}
+    return {"required": True, "content": content}
 
 
 def _operation(summary: str, content: Schema, *refusals: int, success: int = 200) -> Schema:

@@ -32,8 +32,10 @@ def media_type(request: Request, *accepted: str) -> str:
     return kind
 
 
-async def read_body(request: Request, most_bytes: int = MOST_BYTES) -> bytes:
-    """Read a body of at most so many bytes.
+async def read_body(
+    request: Request, most_bytes: int = MOST_BYTES, timeout_s: float = TIMEOUT_S
+) -> bytes:
+    """Read a body of at most so many bytes, in so many seconds.
 
     Raises
     ------
@@ -44,9 +46,9 @@ async def read_body(request: Request, most_bytes: int = MOST_BYTES) -> bytes:
     if announced.isdecimal() and int(announced[:20]) > most_bytes:
         _too_long(most_bytes)
     try:
-        return await asyncio.wait_for(_read(request, most_bytes), TIMEOUT_S)
+        return await asyncio.wait_for(_read(request, most_bytes), timeout_s)
     except asyncio.TimeoutError:
-        raise HTTPException(408, f"The body took more than {TIMEOUT_S:g} s.") from None
+        raise HTTPException(408, f"The body took more than {timeout_s:g} s.") from None
     except ClientDisconnect:
         raise HTTPException(400, "The body is incomplete.") from None
 

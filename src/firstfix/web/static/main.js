@@ -3,6 +3,7 @@
 import { Actions } from "./actions.js";
 import { Camera } from "./camera.js";
 import { Connection } from "./connection.js";
+import { Drop } from "./drop.js";
 import { Gestures } from "./gestures.js";
 import { listenToKeys } from "./keyboard.js";
 import { boundsOf } from "./layers/map.js";
@@ -46,8 +47,16 @@ const connection = new Connection({
   },
   onTokenAsked: askForToken,
 });
-const actions = new Actions(connection, scene, view, notices, redraw, () => past.goLive());
-const past = new Past({ onLook: look, onLive: () => look(scene.live) });
+const actions = new Actions(connection, scene, view, notices, redraw, lookAtRobot);
+const past = new Past({ onLook: lookBack, onLive: () => look(scene.live) });
+const drop = new Drop({
+  onLocated(frame) {
+    sheet.close();
+    look(frame);
+  },
+  onLeave: () => look(scene.live),
+  onProblem: (text) => notices.showError(text),
+});
 const tour = new Tour((message) => actions.send(message));
 const panel = new Panel({
   onPick: (id) => actions.pick(id),
@@ -67,6 +76,7 @@ function take(message) {
 function greet(hello) {
   app.dataset.connected = "true";
   notices.hideLost();
+  lookAtRobot();
   scene.clearRobot();
   past.clear();
   timeline.replace(hello.events);
@@ -84,11 +94,24 @@ function takeState(state) {
   if (scene.isLive) showState(state);
 }
 
+function lookBack(frame) {
+  drop.leave();
+  look(frame);
+}
+
+/** A command is for the robot as it is now. */
+function lookAtRobot() {
+  drop.leave();
+  past.goLive();
+}
+
 /** Look at a frame: the robot as it is, or as it was. */
 function look(frame) {
+  const before = scene.map;
   scene.frame = frame;
-  app.dataset.time = scene.isLive ? "live" : "past";
+  app.dataset.time = scene.isLive ? "live" : drop.isOpen ? "file" : "past";
   panel.isLive = scene.isLive;
+  if (scene.map !== before) showOtherMap();
   if (frame.state) showState(frame.state);
   redraw();
 }
@@ -119,6 +142,14 @@ async function showMap(map) {
   renderer.recolour();
   app.dataset.map = map.name;
   performance.mark("map-shown");
+}
+
+/** A map of a file, or the robot's again. */
+function showOtherMap() {
+  panel.showMap(scene.map);
+  view.bounds = boundsOf(scene.map);
+  renderer.recolour();
+  camera.fit();
 }
 
 async function imageOf(map) {
@@ -165,6 +196,7 @@ function numbers(values) {
 /** Leave one thing: a mode, the past, or the tour. */
 function leave() {
   if (scene.mode !== "look") actions.leaveMode();
+  else if (drop.isOpen) drop.leave();
   else if (past.isLive) tour.leave();
   else past.goLive();
 }

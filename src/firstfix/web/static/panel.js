@@ -58,7 +58,7 @@ export class Panel {
     const { icon, verdict } = state.chosen_by ? format.choiceTexts(state) : format.stateTexts(name);
     byId("app").dataset.state = name;
     byId("app").dataset.chosen = String(Boolean(state.chosen_by));
-    setText(byId("state-word"), name);
+    setText(byId("state-word"), state.word ?? name);
     byId("state-icon").setAttribute("href", `#${icon}`);
     setText(byId("verdict"), verdict);
     setText(byId("reason"), sentence(state.reason));
@@ -147,7 +147,7 @@ export class Panel {
     setText(byId("time-to-fix"), fix == null ? "–" : format.seconds(fix));
     setText(byId("cpu"), state.cpu_ms == null ? "–" : `${state.cpu_ms.toFixed(1)} ms`);
     setText(byId("particles"), state.particles ? state.particles.toLocaleString("en") : "–");
-    setText(byId("viewers"), String(state.viewers ?? 1));
+    setText(byId("viewers"), state.viewers === null ? "–" : String(state.viewers ?? 1));
   }
 
   #showAge() {
@@ -160,7 +160,7 @@ export class Panel {
 
 /** A new name makes the panel render at once. */
 function nameOf(state) {
-  return `${state.state} ${state.chosen_by ?? ""}`;
+  return `${state.word ?? state.state} ${state.chosen_by ?? ""}`;
 }
 
 function child(tag, className) {

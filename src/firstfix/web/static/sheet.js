@@ -30,6 +30,11 @@ export class Sheet {
     return this.#handle.getAttribute("aria-expanded") === "true";
   }
 
+  /** Show the map again. */
+  close() {
+    if (this.isNarrow && this.isOpen) this.#open(false);
+  }
+
   /** How much of the window the panel and the bars cover, px. */
   covered() {
     const box = this.#panel.getBoundingClientRect();
