@@ -6,8 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from firstfix.amcl import likelihood_field
+from firstfix.amcl.config import AmclConfig, SensorModel
 from firstfix.cli import doctor
 from firstfix.cli.doctor import cache_advice
+from firstfix.localizer.precompile import precompile
 
 NO_CACHE = "cannot cache function '_sweep': no matcher available for file 'clearance.py'"
 
@@ -119,3 +122,18 @@ def test_any_command_prints_the_advice(cli, monkeypatch) -> None:
 
 def test_other_errors_stay_what_they_are() -> None:
     assert cache_advice(RuntimeError("anything else")) is None
+
+
+def test_the_kernels_of_nodes_are_compiled(monkeypatch) -> None:
+    """Those of every sensor model, with the one that skips beams."""
+    asked = []
+    monkeypatch.setattr("firstfix.localizer.precompile.precompile", asked.append)
+    doctor._tried_kernels()
+    assert {config.laser_model_type for config in asked} == set(SensorModel)
+    assert all(config.do_beamskip for config in asked)
+
+
+@pytest.mark.slow
+def test_beam_skipping_compiles_its_kernel() -> None:
+    precompile(AmclConfig(laser_model_type=SensorModel.LIKELIHOOD_FIELD_PROB, do_beamskip=True))
+    assert likelihood_field._count_values.signatures

@@ -19,6 +19,8 @@ TYPES = {
     "initialpose": "geometry_msgs/PoseWithCovarianceStamped",
     "amcl_pose": "geometry_msgs/PoseWithCovarianceStamped",
     "hypotheses": "geometry_msgs/PoseArray",
+    "hypothesis_markers": "visualization_msgs/MarkerArray",
+    "localized": "std_msgs/Bool",
     "particle_cloud": "geometry_msgs/PoseArray",
     "localization_status": "diagnostic_msgs/DiagnosticArray",
     "scan": "sensor_msgs/LaserScan",
@@ -70,7 +72,11 @@ READERS = {
     "sensor_msgs/LaserScan": lambda _: {},
     "tf2_msgs/TFMessage": of_transforms,
     "kobuki/WheelDropEvent": of_event,
+    "std_msgs/Bool": lambda message: {"data": message.data},
     "std_msgs/String": lambda message: {"data": message.data},
+    "visualization_msgs/MarkerArray": lambda message: {
+        "texts": [marker.text for marker in message.markers if marker.text]
+    },
     "rosgraph_msgs/Log": of_log,
 }
 

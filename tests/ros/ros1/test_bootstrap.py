@@ -40,15 +40,19 @@ def test_a_robot_at_rest_is_found_once_and_late_subscribers_get_the_pose(ros1: L
 
 
 def test_identical_places_are_published_instead_of_a_pose(ros1: Lab) -> None:
-    watcher = ros1.watch("initialpose", "hypotheses", "localization_status")
+    watcher = ros1.watch(
+        "initialpose", "hypotheses", "hypothesis_markers", "localization_status", "localized"
+    )
     ros1.node()
     robot = ros1.robot("twins")
     reported = watcher.wait_for("localization_status", state="DISAMBIGUATING")
     assert reported["level"] == 1
     assert "4 places look identical to this sensor" in reported["message"]
     assert len(watcher.wait_for("hypotheses")["places"]) == int(reported["hypotheses"]) > 1
+    assert watcher.wait_for("hypothesis_markers")["texts"] == ["25%"] * 4
     time.sleep(A_WHILE_S)
     assert not watcher.lines("initialpose")
+    assert [line["data"] for line in watcher.lines("localized")] == [False]
 
     # The last hypotheses are there for viewers that come late.
     late = ros1.watch("hypotheses").wait_for("hypotheses")
