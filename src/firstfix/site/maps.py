@@ -16,6 +16,7 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.fields import cache
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.searchable import check_positions, check_searchable
+from firstfix.io.atomic_files import unreachable
 from firstfix.io.maps.map_server import load_map
 from firstfix.io.maps.map_yaml import MapYaml, read_yaml
 from firstfix.io.maps.site_yaml import SiteMap
@@ -60,6 +61,7 @@ class PreparedMaps:
         self._cache_dir = cache_dir
         self._limit = memory_limit
         self._held: OrderedDict[str, PreparedMap] = OrderedDict()
+        self._sizes: dict[str, int] = {}
         self._lock = Lock()
 
     def get(self, map_id: str) -> PreparedMap:
@@ -79,15 +81,17 @@ class PreparedMaps:
         with self._lock:
             held = self._held.setdefault(map_id, held)
             self._held.move_to_end(map_id)
-            # The newest grows as its fields are used, so it counts at the next call.
+            # Fields are computed when they are used: what a map has grown by counts next time.
+            self._sizes[map_id] = held.fields.nbytes
             while len(self._held) > 1 and self.held_bytes > self._limit:
-                self._held.popitem(last=False)
+                dropped, _ = self._held.popitem(last=False)
+                del self._sizes[dropped]
         return held
 
     @property
     def held_bytes(self) -> int:
         """Size of the maps that are held, bytes."""
-        return sum(held.fields.nbytes for held in self._held.values())
+        return sum(self._sizes.values())
 
 
 def prepared(entry: SiteMap, cache_dir: Path | None) -> PreparedMap:
@@ -106,7 +110,7 @@ def prepared(entry: SiteMap, cache_dir: Path | None) -> PreparedMap:
         If the map cannot be read, or has nothing to be searched.
     """
     header = read_yaml(entry.path)
-    key = cache.content_key("cells 1", header.path.read_bytes(), header.image.read_bytes())
+    key = cache.content_key("cells 1", _bytes_of(header.path), _bytes_of(header.image))
     if cache_dir is None:
         layers = _layers(entry.path)
     else:
@@ -117,6 +121,16 @@ def prepared(entry: SiteMap, cache_dir: Path | None) -> PreparedMap:
     return PreparedMap(
         entry, fields, cache.content_key(grid.cells, repr((grid.resolution, *grid.T_map_grid)))
     )
+
+
+def _bytes_of(path: Path) -> NDArray[np.uint8]:
+    """Map a file into memory; a damaged image may be of any size."""
+    try:
+        if path.stat().st_size == 0:
+            return np.empty(0, np.uint8)
+        return np.memmap(path, np.uint8, "r")
+    except OSError as error:
+        raise unreachable(path, error) from error
 
 
 def _layers(path: Path) -> NDArray[np.int8]:

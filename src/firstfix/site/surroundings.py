@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 
-RADIUS_M = 30.0
+RADIUS_M = 25.0
 """Half the side of the square that is compared, m."""
 
-STEP_M = 0.2
+STEP_M = 0.25
 """Distance of the samples, m."""
 
 UNKNOWN, FREE, WALL = 0, 1, 2
