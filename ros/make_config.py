@@ -30,9 +30,9 @@ def text() -> str:
         if group and group != before:
             lines.append(f"    {group}:\n")
         words = f"; one of {', '.join(parameter.choices)}" if parameter.choices else ""
-        told, meaning = meaning, parameter.description + words
+        previous, meaning = meaning, parameter.description + words
         indent = "      " if group else "    "
-        if meaning != told:
+        if meaning != previous:
             lines.append(f"{indent}# {meaning}\n")
         lines.append(f"{indent}{name}: {_shown(parameter.default)}\n")
     return HEAD + "".join(lines)

@@ -34,19 +34,19 @@ def generate_launch_description():
 
 
 def start(context):
-    """Return the node, with the parameters that were asked for."""
+    """Return the node, with the parameters of the arguments."""
     given = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
-    asked = {name: given[name].lower() == "true" for name in ("use_sim_time", "autostart")}
-    asked |= {name: given[name] for name in ("mode", "scan_topics") if given[name]}
+    chosen = {name: given[name].lower() == "true" for name in ("use_sim_time", "autostart")}
+    chosen |= {name: given[name] for name in ("mode", "scan_topics") if given[name]}
     if given["map"]:
-        asked["yaml_filename"] = str(Path(given["map"]).absolute())
+        chosen["yaml_filename"] = str(Path(given["map"]).absolute())
     node = Node(
         package="firstfix",
         executable="firstfix_node",
         name="firstfix",
         namespace=given["namespace"],
         output="screen",
-        parameters=[given["params_file"], asked],
+        parameters=[given["params_file"], chosen],
         # Relative, so that several robots have transforms of their own, as in Nav2.
         remappings=[("/tf", "tf"), ("/tf_static", "tf_static")],
     )

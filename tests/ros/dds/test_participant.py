@@ -14,7 +14,7 @@ from cyclonedds.idl import make_idl_struct, types
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.topic import Topic as DdsTopic
-from dds_lab import pose_of, wait_for
+from dds_lab import free_domain, pose_of, wait_for
 
 from firstfix.cli.app import run
 from firstfix.core.angles import angle_error
@@ -196,11 +196,21 @@ def test_discovery_follows_the_environment_variables_of_ros(dds):
     here = "<General><Interfaces><NetworkInterface name='lo'/></Interfaces></General>"
     near = {"ROS_LOCALHOST_ONLY": "1", "CYCLONEDDS_URI": here}
     alone = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF", "CYCLONEDDS_URI": here}
+    quiet = here.replace("</General>", "<AllowMulticast>false</AllowMulticast></General>")
+    peer = {"ROS_STATIC_PEERS": "127.0.0.1", "CYCLONEDDS_URI": quiet}
     graphs = dds.ear_named(GRAPH.name, GRAPH.type_name)
-    hidden = dds.node("--name", "hidden", **alone)
+
+    def names():
+        return {m.node_entities_info_seq[0].node_name for m in graphs.received}
+
+    hidden = [
+        dds.node("--name", "hidden", **alone),
+        dds.node("--name", "elsewhere", **near, ROS_DOMAIN_ID=str(free_domain())),
+    ]
     dds.node("--name", "near", **near)
-    wait_for(lambda: graphs.received and "no message on" in hidden.log)
-    assert {m.node_entities_info_seq[0].node_name for m in graphs.received} == {"near"}
+    dds.node("--name", "peer", **peer)
+    wait_for(lambda: len(names()) > 1 and all("no message on" in node.log for node in hidden))
+    assert names() == {"near", "peer"}
 
 
 @pytest.mark.slow

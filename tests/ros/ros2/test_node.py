@@ -353,7 +353,7 @@ def test_a_bad_bond_timeout_is_reported_in_one_line(lab: Lab) -> None:
 
 
 def test_cleanup_frees_memory(lab: Lab, hall_plan: OccupancyGrid) -> None:
-    """Without waiting for the collector of cycles, which arrays of 25 MB do not trigger."""
+    """At once: arrays of 25 MB do not trigger the collector of reference cycles."""
     node = lab.node("-p", "mode:=full")
     robot = Robot(lab, hall_plan, HERE)
     poses = lab.subscribe("amcl_pose", POSE, is_latched=True)

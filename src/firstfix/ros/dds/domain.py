@@ -14,8 +14,8 @@ _RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 # So many processes of one machine find each other without multicast; rmw_cyclonedds' number.
 _PROCESSES = 32
 _BEFORE_IRON = ("foxy", "galactic", "humble")
-# ROS 2 tells messages apart by their names. Fast DDS (1.15), for one, describes its types
-# otherwise than Cyclone DDS (1.16) does, and where descriptions differ nothing would be heard.
+# ROS 2 identifies messages by their names. Fast DDS (1.15) describes its types in another way than
+# Cyclone DDS (1.16), and endpoints whose descriptions differ would not match.
 _NAMES_COUNT = (
     "<Compatibility><IgnoreTypeInformation>1.1,1.15,1.16</IgnoreTypeInformation></Compatibility>"
 )

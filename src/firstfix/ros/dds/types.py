@@ -117,7 +117,7 @@ def decode(type_name: str, data: bytes) -> Any:
 
 
 def type_hash(type_name: str) -> str:
-    """Return the hash of a definition, by which ROS 2 tells versions of a message apart."""
+    """Return the hash of a definition, by which ROS 2 distinguishes versions of a message."""
     return str(_store().hash_rihs01(full_name(type_name)))
 
 
