@@ -13,6 +13,7 @@ PUBLIC = [
     "AnyOf",
     "Change",
     "ChangeCounter",
+    "ChangesConfig",
     "Event",
     "Evidence",
     "FirstfixError",

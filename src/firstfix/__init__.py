@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from firstfix.io.maps.map_server import load_map, save_map
     from firstfix.lab.scenarios.example_drive import simulate_drive
     from firstfix.lab.simulation.lidar import Lidar
-    from firstfix.localizer.config import LocalizerConfig, MonitorConfig, ScansConfig
+    from firstfix.localizer.config import ChangesConfig, LocalizerConfig, MonitorConfig, ScansConfig
     from firstfix.localizer.inputs import NewMap, NoMotionUpdate, PoseHint, PositionFix, Reset
     from firstfix.localizer.localizer import Localizer
     from firstfix.localizer.outputs import (
@@ -51,6 +51,7 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "AnyOf",
     "Change",
     "ChangeCounter",
+    "ChangesConfig",
     "Event",
     "Evidence",
     "FirstfixError",
@@ -135,7 +136,7 @@ _MODULES = {
     "io.maps.map_server": ("load_map", "save_map"),
     "lab.scenarios.example_drive": ("simulate_drive",),
     "lab.simulation.lidar": ("Lidar",),
-    "localizer.config": ("LocalizerConfig", "MonitorConfig", "ScansConfig"),
+    "localizer.config": ("ChangesConfig", "LocalizerConfig", "MonitorConfig", "ScansConfig"),
     "localizer.inputs": ("NewMap", "NoMotionUpdate", "PoseHint", "PositionFix", "Reset"),
     "localizer.localizer": ("Localizer",),
     "localizer.outputs": ("Hypotheses", "InitialPose", "MotionRequest", "Status", "TrackedPose"),

@@ -16,7 +16,7 @@ from firstfix.core.se2 import SE2
 from firstfix.global_localization.config import LocateConfig
 from firstfix.io.parameters.amcl_yaml import IGNORED
 from firstfix.io.parameters.ros1_amcl import GONE, NEW_NAMES
-from firstfix.localizer.config import MonitorConfig, ScansConfig
+from firstfix.localizer.config import ChangesConfig, MonitorConfig, ScansConfig
 from firstfix.ros.node_config import Mode, NodeConfig
 from firstfix.ros.parameters import Parameter, configured, flattened, load_node_config, parameters
 
@@ -30,6 +30,7 @@ def test_every_setting_is_a_parameter_and_every_parameter_a_setting():
     expected |= {f"monitor.{entry.name}" for entry in fields(MonitorConfig)}
     expected |= {f"belief.{entry.name}" for entry in fields(BeliefConfig)}
     expected |= {entry.name for entry in fields(ScansConfig)}
+    expected |= {f"changes.{entry.name}" for entry in fields(ChangesConfig)}
     expected -= {"localizer", "initial_pose"}
     expected |= {"initial_pose.x", "initial_pose.y", "initial_pose.yaw"}
     assert set(BY_NAME) == expected

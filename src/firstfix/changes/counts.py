@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta, timezone
@@ -31,6 +32,9 @@ _MOST_TOLERANCE_M = 0.5
 _MOST_SIGMA_M = 0.15
 LONGEST_M = 15.0
 """Farther away nothing is counted, m."""
+
+# A scan that fits no better than this may have been taken elsewhere.
+LEAST_EXPLAINED = 0.5
 
 _SECONDS_A_DAY = 86400.0
 _EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
@@ -122,7 +126,8 @@ class _OpenDay:
 class ChangeCounter:
     """Counts what the scans of a localized robot confirm and contradict in a map.
 
-    Its memory is bounded: seven bytes per cell for the first day, six for each further one.
+    One thread may count while another reads. Memory is bounded: a byte per cell, and six per cell
+    and day.
 
     Parameters
     ----------
@@ -146,33 +151,37 @@ class ChangeCounter:
         self._days: dict[int, _OpenDay] = {}
         self._marks = np.zeros(fields.grid.cells.shape, np.uint8)
         self._last: SE2 | None = None
+        self._lock = threading.Lock()
 
     @property
     def days(self) -> tuple[DayCounts, ...]:
         """A copy of the counts of each day, oldest first."""
-        return tuple(
-            DayCounts(
-                number,
-                day.hits.copy(),
-                day.near.copy(),
-                day.passes.copy(),
-                day.views,
-                day.beams,
-                day.explained,
+        with self._lock:
+            return tuple(
+                DayCounts(
+                    number,
+                    day.hits.copy(),
+                    day.near.copy(),
+                    day.passes.copy(),
+                    day.views,
+                    day.beams,
+                    day.explained,
+                )
+                for number, day in sorted(self._days.items())
             )
-            for number, day in sorted(self._days.items())
-        )
 
     @property
     def views(self) -> int:
         """Number of views of all days kept."""
-        return sum(day.views for day in self._days.values())
+        with self._lock:
+            return sum(day.views for day in self._days.values())
 
     @property
     def explained(self) -> float:
         """Share of beams that end at a wall of the map, 0 to 1; 1 before the first beam."""
-        beams = sum(day.beams for day in self._days.values())
-        return sum(day.explained for day in self._days.values()) / beams if beams else 1.0
+        with self._lock:
+            beams = sum(day.beams for day in self._days.values())
+            return sum(day.explained for day in self._days.values()) / beams if beams else 1.0
 
     def add(
         self, scans: Sequence[LaserScan], T_map_base: SE2, covariance: NDArray[np.float64]
@@ -200,6 +209,13 @@ class ChangeCounter:
         if self._last is not None and not is_new_view(self._last, T_map_base):
             return False
         self._last = T_map_base
+        with self._lock:
+            self._count_view(scans, T_map_base, sigma_m, sigma_rad)
+        return True
+
+    def _count_view(
+        self, scans: Sequence[LaserScan], T_map_base: SE2, sigma_m: float, sigma_rad: float
+    ) -> None:
         day = self._day(day_of(scans[0].stamp))
         day.views += 1
         grid = self._fields.grid
@@ -211,7 +227,6 @@ class ChangeCounter:
         # All sensors are marked first: a cell counts once in a view.
         for T_grid_laser in sensors:
             self._count(day, T_grid_laser)
-        return True
 
     def _day(self, number: int) -> _OpenDay:
         """Return the counts of a day; a new day pushes out the oldest."""

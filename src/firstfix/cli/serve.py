@@ -116,6 +116,12 @@ def serve(
         bool, typer.Option("--read-only", help="Viewers can watch and ask, but not steer.")
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Of the simulated robot.")] = 1,
+    keep_changes: Annotated[
+        int,
+        typer.Option(
+            min=0, max=366, metavar="DAYS", help="Count for DAYS what has changed in the map."
+        ),
+    ] = 0,
     vda5050: FleetUrl = None,
     manufacturer: Manufacturer = None,
     serial_number: SerialNumber = None,
@@ -142,9 +148,11 @@ def serve(
             from firstfix.lab.worlds.catalog import world_or_map
 
             grid, name = world_or_map(map_), Path(map_).stem
-            serve_simulated(grid, name, seed, address, Rest.AWAKE, bridge)
+            serve_simulated(grid, name, seed, address, Rest.AWAKE, bridge, keep_changes)
         else:
-            serve_robot(robot.value, Path(map_), context.args, address, bridge)
+            kept = ["--ros-args", "-p", f"changes.days_kept:={keep_changes}"]
+            arguments = [*context.args, *kept] if keep_changes else context.args
+            serve_robot(robot.value, Path(map_), arguments, address, bridge)
 
 
 def serve_simulated(
@@ -154,6 +162,7 @@ def serve_simulated(
     address: Address,
     rest: Rest,
     bridge: Bridge | None = None,
+    keep_changes: int = 0,
 ) -> None:
     """Serve the page of a simulated robot in a building called ``name`` until it is interrupted.
 
@@ -165,6 +174,7 @@ def serve_simulated(
     from firstfix.global_localization.searchable import check_searchable
     from firstfix.lab.live.simulated_node import SimulatedNode
     from firstfix.lab.live.simulated_robot import SimulatedRobot
+    from firstfix.localizer.config import ChangesConfig, LocalizerConfig
     from firstfix.web.command_executor import CommandExecutor
     from firstfix.web.page import Page
     from firstfix.web.server import listen, make_server
@@ -182,7 +192,9 @@ def serve_simulated(
         robot = SimulatedRobot(grid, seed, name)
         if rest is Rest.SLEEPS:
             robot.pause()
-        node = SimulatedNode(robot, store, warn, [] if bridge is None else [bridge])
+        watchers = [] if bridge is None else [bridge]
+        config = LocalizerConfig(changes=ChangesConfig(days_kept=keep_changes))
+        node = SimulatedNode(robot, store, warn, watchers, config)
         if bridge is not None:
             bridge.attach(node.give)
         executor = CommandExecutor(store, node.give, robot)

@@ -92,6 +92,32 @@ class ScansConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class ChangesConfig:
+    """What is kept about changes of the map.
+
+    Raises
+    ------
+    InputError
+        If a setting is out of its range.
+
+    Examples
+    --------
+    >>> config = ff.LocalizerConfig(changes=ff.ChangesConfig(days_kept=7))
+    """
+
+    days_kept: int = setting(
+        0,
+        "days for which hits and passes of beams are counted, to report what has changed in the "
+        "map; 6 bytes per cell and day; 0 for none",
+        0,
+        366,
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+
+@dataclass(frozen=True, slots=True)
 class LocalizerConfig:
     """The settings of a `Localizer`.
 
@@ -107,6 +133,8 @@ class LocalizerConfig:
         The choice between several places.
     scans : ScansConfig
         What is done to scans first.
+    changes : ChangesConfig
+        What is kept about changes of the map.
 
     Examples
     --------
@@ -120,6 +148,7 @@ class LocalizerConfig:
     monitor: MonitorConfig = field(default_factory=MonitorConfig)
     belief: BeliefConfig = field(default_factory=BeliefConfig)
     scans: ScansConfig = field(default_factory=ScansConfig)
+    changes: ChangesConfig = field(default_factory=ChangesConfig)
 
     def __post_init__(self) -> None:
         as_instance(LocateConfig, self.locate, "locate")
@@ -127,3 +156,4 @@ class LocalizerConfig:
         as_instance(MonitorConfig, self.monitor, "monitor")
         as_instance(BeliefConfig, self.belief, "belief")
         as_instance(ScansConfig, self.scans, "scans")
+        as_instance(ChangesConfig, self.changes, "changes")

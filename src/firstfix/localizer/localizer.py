@@ -10,6 +10,7 @@ from firstfix.amcl.particles import Particles
 from firstfix.belief.belief import Belief
 from firstfix.belief.prior import Gaussian
 from firstfix.belief.view import View
+from firstfix.changes.counts import LEAST_EXPLAINED, ChangeCounter
 from firstfix.core.arguments import as_instance
 from firstfix.core.errors import InputError
 from firstfix.core.estimate import Evidence, Hypothesis, Verdict
@@ -74,6 +75,7 @@ class Localizer:
         self._matcher: ScanMatcher
         self._tracker: PoseTracker
         self._places: PlaceBelief
+        self._changes: ChangeCounter | None = None
 
     @property
     def state(self) -> State:
@@ -98,6 +100,11 @@ class Localizer:
     def matcher(self) -> ScanMatcher | None:
         """Global localization on the map in use; None before the first map."""
         return None if self._state is State.NO_MAP else self._matcher
+
+    @property
+    def changes(self) -> ChangeCounter | None:
+        """What scans contradict in the map in use; None unless `ChangesConfig` keeps days."""
+        return self._changes
 
     def handle(self, given: Input) -> list[Output]:
         """Process one input.
@@ -151,6 +158,8 @@ class Localizer:
         pause = self.config.monitor.rest_period_s
         self._places = PlaceBelief(matcher.fields, self.config.belief, pause)
         self._matcher = matcher
+        days = self.config.changes.days_kept
+        self._changes = ChangeCounter(matcher.fields, days) if days else None
         status = self._restart(given.stamp, Event.MAP_RECEIVED, "map received: searching")
         if not self._lifted:
             return [status]
@@ -308,8 +317,14 @@ class Localizer:
         revised = self._reconsider(view, tracked)
         if revised:
             return revised
+        if self._chosen_by is None and place.evidence.explained >= LEAST_EXPLAINED:
+            self._count_changes(view, tracked)
         reason = self._unless_chosen(tracked.fit_in_words)
         return [tracked.pose, self._status(view.stamp, reason, place.evidence)]
+
+    def _count_changes(self, view: View, tracked: Tracked) -> None:
+        if self._changes is not None:
+            self._changes.add(view.scans, tracked.pose.T_map_base, tracked.pose.covariance)
 
     def _reconsider(self, view: View, tracked: Tracked) -> list[Output]:
         """Weigh all places in the background; return what changes if the pose was wrong."""

@@ -16,6 +16,7 @@ from firstfix.web.commands import Command, Pose, Relocalize, SetPose
 from firstfix.web.dropped_files import DroppedFiles
 from firstfix.web.json_decoding import decode
 from firstfix.web.locate_queue import LocateQueue
+from firstfix.web.map_changes import Changes, counter_of
 from firstfix.web.map_png import LEAST_PIXELS, MOST_PIXELS, cells_per_pixel
 from firstfix.web.messages import Accepted, Map, Status
 from firstfix.web.openapi import document
@@ -49,6 +50,8 @@ class Api:
             Route("/v1/status", self.status),
             Route("/v1/map", self.map),
             Route("/v1/map.png", self.map_png),
+            Route("/v1/map/changes", self.changes),
+            Route("/v1/map/changes.png", self.changes_png),
             Route("/v1/locate", self.locate, methods=["POST"]),
             Route("/v1/locate-files", self.locate_files, methods=["POST"]),
             Route("/v1/pose", self.pose, methods=["POST"]),
@@ -73,6 +76,19 @@ class Api:
             return Response(status_code=304, headers=headers)
         png = await run_in_threadpool(self._page.map_pngs.png, active_map, most)
         return Response(png, media_type="image/png", headers=headers)
+
+    async def changes(self, _: Request) -> Response:
+        """Describe what has changed in the map."""
+        active_map = self._page.map()
+        counter = counter_of(active_map)
+        found = await run_in_threadpool(self._page.changes.find, active_map)
+        return _json(Changes.of(found, counter.explained))
+
+    async def changes_png(self, request: Request) -> Response:
+        """Return what has changed as a PNG over the map."""
+        active_map, most = self._page.map(), _most_pixels(request)
+        png = await run_in_threadpool(self._page.changes.png, active_map, most)
+        return Response(png, media_type="image/png", headers={"cache-control": "no-store"})
 
     async def locate(self, request: Request) -> Response:
         """Search one scan in the map."""

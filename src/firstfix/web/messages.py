@@ -41,6 +41,7 @@ class Map(Struct, frozen=True):
     resolution: Annotated[float, Meta(description="m per cell")]
     origin: Pose
     image: MapImage
+    changes: Annotated[str | None, Meta(description="URL of a PNG of what has changed, if kept")]
 
     @classmethod
     def of(cls, active_map: ActiveMap) -> Map:
@@ -54,6 +55,7 @@ class Map(Struct, frozen=True):
             resolution=grid.resolution,
             origin=as_tuple(grid.T_map_grid),
             image=MapImage(width, height, resolution, f"/v1/map.png?v={active_map.key[:12]}"),
+            changes=None if active_map.changes is None else "/v1/map/changes.png",
         )
 
 

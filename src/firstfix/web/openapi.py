@@ -10,6 +10,7 @@ from firstfix import __version__
 from firstfix.web.commands import Pose
 from firstfix.web.dropped_files import MOST_FILES
 from firstfix.web.locate_queue import Scan
+from firstfix.web.map_changes import Changes
 from firstfix.web.map_png import LEAST_PIXELS, MOST_PIXELS
 from firstfix.web.messages import Accepted, Answer, LocatedFiles, Map, Status
 from firstfix.web.problem_details import MEDIA_TYPE, Problem
@@ -17,7 +18,7 @@ from firstfix.web.request_body import JSON, NPZ
 
 Schema = dict[str, Any]
 
-_STRUCTS = (Pose, Scan, Accepted, Answer, LocatedFiles, Map, Status, Problem)
+_STRUCTS = (Pose, Scan, Accepted, Answer, LocatedFiles, Map, Changes, Status, Problem)
 # Refusals of requests with a body.
 _BODY = (400, 408, 413, 415, 422)
 
@@ -62,6 +63,19 @@ def _paths() -> Schema:
         "/v1/map.png": {
             "get": _operation("The map as an 8-bit grey PNG", {"image/png": {}}, 422, 503)
             | {"parameters": [pixels, version]}
+        },
+        "/v1/map/changes": {
+            "get": _operation("What has changed in the map", _json(Changes), 404, 503)
+        },
+        "/v1/map/changes.png": {
+            "get": _operation(
+                "What has changed as a PNG with alpha, over the map",
+                {"image/png": {}},
+                404,
+                422,
+                503,
+            )
+            | {"parameters": [pixels]}
         },
         "/v1/locate": {
             "post": _operation("Search one scan in the map", _json(Answer), *_BODY, 404, 503)

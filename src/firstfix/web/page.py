@@ -9,6 +9,7 @@ from starlette.exceptions import HTTPException
 
 from firstfix.web.access_control import AccessPolicy
 from firstfix.web.command_executor import CommandExecutor
+from firstfix.web.map_changes import ChangesCache
 from firstfix.web.map_png import MapPngCache
 from firstfix.web.messages import Hello, Map, encode_text
 from firstfix.web.rate_limiter import RateLimiter
@@ -42,6 +43,8 @@ class Page:
         Limits the requests of each client.
     map_pngs : MapPngCache
         Encodes maps.
+    changes : ChangesCache
+        Finds what has changed in the map.
     """
 
     robot: str
@@ -51,6 +54,7 @@ class Page:
     on_first_viewer: Callable[[], None] = _do_nothing
     rate_limiter: RateLimiter = field(default_factory=RateLimiter)
     map_pngs: MapPngCache = field(default_factory=MapPngCache)
+    changes: ChangesCache = field(default_factory=ChangesCache)
 
     def hello(self) -> str:
         """Return the first message to a viewer."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from firstfix.amcl.particles import Particles
 from firstfix.belief.belief import Belief
+from firstfix.changes.counts import ChangeCounter
 from firstfix.core.estimate import Evidence, Hypothesis
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
@@ -33,12 +34,15 @@ class ActiveMap:
         The map.
     matcher : ScanMatcher
         Prepared for it.
+    changes : ChangeCounter or None
+        What scans contradict in it, if that is kept.
     """
 
     name: str
     key: str
     grid: OccupancyGrid
     matcher: ScanMatcher
+    changes: ChangeCounter | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

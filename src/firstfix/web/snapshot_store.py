@@ -121,7 +121,9 @@ class SnapshotStore:
         self._scans.clear()
         if localizer.matcher is not None:
             key = map_key(given.grid)
-            active_map = ActiveMap(self._map_name, key, given.grid, localizer.matcher)
+            active_map = ActiveMap(
+                self._map_name, key, given.grid, localizer.matcher, localizer.changes
+            )
             self._snapshot = replace(self._snapshot, map=active_map)
 
     def _store_output(self, output: Output, localizer: Localizer) -> None:

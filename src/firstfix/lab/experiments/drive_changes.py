@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.changes.counts import ChangeCounter, DayCounts, is_new_view
+from firstfix.changes.counts import LEAST_EXPLAINED, ChangeCounter, DayCounts, is_new_view
 from firstfix.core.errors import FirstfixError, InputError
 from firstfix.core.estimate import Evidence
 from firstfix.core.grid import OccupancyGrid
@@ -31,10 +31,8 @@ _DAYS = 366
 _GIVEN_COVARIANCE = np.diag([0.05**2, 0.05**2, np.radians(0.5) ** 2])
 
 # With fewer beams at walls of the map the poses or the map are wrong, not the building.
-_LEAST_EXPLAINED = 0.3
+_LEAST_AT_WALLS = 0.3
 _JUDGED_FROM = 20
-# A scan of a tracked robot that fits no better does not count.
-_FITS = 0.5
 # From view to view.
 _MOST_DRIFT_M = 0.3
 
@@ -193,7 +191,7 @@ def _backwards(
 
 
 def _fits(evidence: Evidence | None) -> bool:
-    return evidence is not None and evidence.explained >= _FITS
+    return evidence is not None and evidence.explained >= LEAST_EXPLAINED
 
 
 def merged_days(days: Sequence[DayCounts]) -> list[DayCounts]:
@@ -214,7 +212,7 @@ def merged_days(days: Sequence[DayCounts]) -> list[DayCounts]:
 def _check_building(counter: ChangeCounter) -> None:
     if counter.views == 0:
         raise InputError("No pose is certain enough to compare a scan with the map.")
-    if counter.explained < _LEAST_EXPLAINED:
+    if counter.explained < _LEAST_AT_WALLS:
         raise OtherBuildingError(
             f"Only {counter.explained:.0%} of the beams of {counter.views} views end at walls of "
             "this map. It is probably that of another building, or the poses are not in its frame."

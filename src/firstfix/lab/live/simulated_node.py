@@ -13,6 +13,7 @@ from firstfix.fields.cache import cache_folder
 from firstfix.lab.live.plain_amcl import PlainAmcl
 from firstfix.lab.live.simulated_robot import SimulatedRobot
 from firstfix.lab.simulation.simulation import PERIOD_S, Moment
+from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import TrackedPose
@@ -42,6 +43,8 @@ class SimulatedNode:
         Receives what went wrong, as text.
     watchers : sequence of Watcher
         Others that watch the localizer.
+    config : LocalizerConfig, optional
+        Settings of the localizer.
     """
 
     def __init__(
@@ -50,6 +53,7 @@ class SimulatedNode:
         store: SnapshotStore,
         warn: Callable[[str], None],
         watchers: Sequence[Watcher] = (),
+        config: LocalizerConfig | None = None,
     ) -> None:
         self._robot = robot
         self._store = store
@@ -59,7 +63,8 @@ class SimulatedNode:
         self._starts = robot.starts
         self._amcl: PlainAmcl | None = None
         self._known: SE2 | None = None  # the last published pose
-        self._localizer = Localizer(cache_dir=cache_folder())
+        self._config = config
+        self._localizer = Localizer(config, cache_dir=cache_folder())
         self._thread = threading.Thread(target=self._run, name="firstfix", daemon=True)
 
     def start(self) -> None:
@@ -113,7 +118,7 @@ class SimulatedNode:
         """Begin again in a world, whose clock starts at zero."""
         self._starts = self._robot.starts
         self._amcl = self._known = None
-        self._localizer = Localizer(cache_dir=cache_folder())
+        self._localizer = Localizer(self._config, cache_dir=cache_folder())
         self._store.set_map_name(self._robot.status.world)
         self._handle(NewMap(0.0, self._robot.grid))
 

@@ -6,6 +6,7 @@ import { Connection } from "./connection.js";
 import { Drop } from "./drop.js";
 import { Gestures } from "./gestures.js";
 import { listenToKeys } from "./keyboard.js";
+import { Changes } from "./layers/changes.js";
 import { boundsOf } from "./layers/map.js";
 import { Notices } from "./notices.js";
 import { Panel } from "./panel.js";
@@ -28,6 +29,7 @@ takeTokenFromFragment();
 
 const scene = new Scene();
 const view = new View();
+scene.changes = new Changes(() => redraw());
 const notices = new Notices();
 const timeline = new Timeline();
 const theme = new Theme();
@@ -125,11 +127,19 @@ function showState(state) {
   redraw();
 }
 
+/** Fetch what has changed in the map while a person wants to see it. */
+function showChanges() {
+  const { map } = scene.live;
+  scene.changes.show(scene.shown.changes && map?.changes ? map : null);
+}
+
 async function showMap(map) {
   panel.showMap(map);
+  document.querySelector("[data-layer=changes]").hidden = !map.changes;
   const { live } = scene;
   if (live.image && JSON.stringify(map) === JSON.stringify(live.map)) return;
   Object.assign(live, { map, image: null });
+  showChanges();
   view.bounds = boundsOf(map);
   renderer.resize(sheet.covered());
   camera.fit();
@@ -250,6 +260,7 @@ for (const chip of document.querySelectorAll("#show .chip")) {
     const { layer } = chip.dataset;
     scene.shown[layer] = !scene.shown[layer];
     chip.setAttribute("aria-pressed", String(scene.shown[layer]));
+    if (layer === "changes") showChanges();
     redraw();
   });
 }

@@ -2,6 +2,7 @@
 
 import { drawAmcl } from "./layers/amcl.js";
 import { drawBelief } from "./layers/belief.js";
+import { drawChanges } from "./layers/changes.js";
 import { drawDraft, drawGoal } from "./layers/draft.js";
 import { drawGrid } from "./layers/grid.js";
 import { drawHypotheses } from "./layers/hypotheses.js";
@@ -78,6 +79,7 @@ export class Renderer {
     const { state, shown, hypotheses } = scene;
     const ctx = cleared(this.#overlay, view);
     const pose = state?.pose ?? null;
+    if (scene.isLive && scene.changes?.image) drawChanges(ctx, view, scene.map, scene.changes.image);
     if (shown.belief && scene.heat && scene.map) drawBelief(ctx, view, scene.map, scene.heat, colours.hypothesis);
     if (shown.scan && scene.scan && pose) drawFieldOfView(ctx, view, scene.scan, pose, colours);
     if (shown.trail && scene.trail.length) drawTrail(ctx, view, scene.trail, colours);

@@ -13,11 +13,12 @@ export class Scene {
   constructor() {
     this.live = emptyFrame(); // its map is as GET /v1/map, its image an ImageBitmap
     this.frame = this.live;
+    this.changes = null; // the layer of what has changed in the map
     this.mode = "look";
     this.draft = null; // {kind, x, y, yaw}: the command that is being drawn
     this.goal = null; // [x, y] where the robot was last sent
     this.highlighted = null; // id of the hypothesis under the pointer or the focus
-    this.shown = { belief: true, scan: true, particles: true, trail: true, truth: true };
+    this.shown = { belief: true, scan: true, particles: true, trail: true, truth: true, changes: true };
   }
 
   get isLive() {
