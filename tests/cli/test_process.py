@@ -71,3 +71,18 @@ def test_ctrl_c_ends_with_130_and_no_traceback(unique: Files) -> None:
     )
     assert ended.returncode == 130
     assert "Traceback" not in ended.stderr
+
+
+def test_ctrl_c_at_the_end_of_a_process_is_too_late() -> None:
+    """As the second of two, when the command has ended."""
+    program = (
+        "import atexit, os, signal\n"
+        "from firstfix.cli import app\n"
+        "app.run = lambda: 0\n"
+        "atexit.register(lambda: os.kill(os.getpid(), signal.SIGINT))\n"
+        "app.main()\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")

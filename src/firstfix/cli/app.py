@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 import sys
 import threading
 from collections.abc import Sequence
@@ -94,6 +95,8 @@ def main() -> None:
     # again and again, and once more at exit, takes a third of a short command's time.
     gc.set_threshold(200_000, 20, 100)
     status = run()
+    # A second Ctrl-C must not interrupt the end of the interpreter, whose default is to die of it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     gc.freeze()
     if any(thread.name == WORKER for thread in threading.enumerate()):
         # It is in the compiler and would crash when the interpreter ends.
