@@ -160,8 +160,8 @@ def label_areas(
         Cells of one kind are connected if rows and columns differ by at most this.
     labels : ndarray of int32, shape (height, width)
         Zeros; written: the number of the area, from 1.
-    stack : ndarray of int64, shape (height * width,)
-        Working memory.
+    stack : ndarray of int64, shape (n,)
+        Working memory for as many cells as are not 0.
 
     Returns
     -------

@@ -229,7 +229,8 @@ def _areas(
     """List the areas, and clear those in ``kinds`` and ``days`` that are too small."""
     labels = np.zeros(kinds.shape, np.int32)
     gap = max(1, round(_GAP_M / grid.resolution))
-    label_areas(kinds, gap, labels, np.empty(kinds.size, np.int64))
+    # A cell is pushed once.
+    label_areas(kinds, gap, labels, np.empty(1 + int(np.count_nonzero(kinds)), np.int64))
     cells = np.flatnonzero(labels)
     order = np.argsort(labels.flat[cells], kind="stable")
     cells = cells[order]

@@ -118,9 +118,13 @@ def predict(
     predictions = []
     # The kernels run without the GIL, so threads share one prepared map.
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for prediction in pool.map(at, range(len(poses))):
-            predictions.append(prediction)
-            done(prediction.answers[Effort.SCAN].value)
+        try:
+            for prediction in pool.map(at, range(len(poses))):
+                predictions.append(prediction)
+                done(prediction.answers[Effort.SCAN].value)
+        except BaseException:  # Ctrl-C must not wait for the places that are left
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
     return predictions
 
 
