@@ -37,6 +37,7 @@ def test_the_page_reconnects_to_a_restarted_server(visit: Visitor, chromium: Any
     server.kill()
     page.page.wait_for_selector("#connection-lost", state="visible")
     assert page.data("connected") == "false"
+    assert page.page.inner_text("#last-known") == "last known"
     page.page.click("#relocalize")
     page.page.wait_for_selector("#error-notice", state="visible")
     server.start()
@@ -44,6 +45,7 @@ def test_the_page_reconnects_to_a_restarted_server(visit: Visitor, chromium: Any
         page.page.wait_for_selector("#connection-lost", state="hidden", timeout=60_000)
         page.wait_for_state("LOCALIZED")
         assert page.data("connected") == "true"
+        assert page.page.is_hidden("#last-known")
     finally:
         server.stop()
     page.page.wait_for_selector("#connection-lost", state="visible")

@@ -157,3 +157,11 @@ def test_subscribers_are_called_until_they_unsubscribe(found):
 def test_the_processor_time_is_that_of_the_localizer_alone(found):
     found.step(60)
     assert 0.0 < found.store.snapshot.cpu_ms < 1000.0
+
+
+def test_a_pose_that_is_not_accepted_is_an_event_of_its_own():
+    house = drive("house")
+    house.step(21)
+    outside = PoseHint(house.store.snapshot.stamp, SE2(-500.0, 0.0, 0.0))
+    house.give(outside)
+    assert house.store.events()[-1].kind == "refused"

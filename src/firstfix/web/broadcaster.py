@@ -41,9 +41,9 @@ class Viewer:
         self._texts.append(text)
         self._filled.set()
 
-    def refuse(self, detail: str) -> None:
-        """Report why a command of the viewer was not executed."""
-        self.append(encode_text(Refusal(detail)))
+    def refuse(self, detail: str, command: str | None = None) -> None:
+        """Report why a command of the viewer was not executed; `command` is its tag, if known."""
+        self.append(encode_text(Refusal(detail, command)))
 
     async def next(self) -> list[Frame]:
         """Wait until there is something, and take everything in the order of sending."""

@@ -92,6 +92,9 @@ class Simulation(Struct, frozen=True):
     sensor: str
     covered: bool
     amcl: AmclStart
+    path: Annotated[
+        tuple[tuple[float, float], ...], Meta(description="corners of the way to a goal, m")
+    ]
 
 
 class Amcl(Struct, frozen=True):
@@ -188,6 +191,7 @@ class Refusal(Struct, frozen=True, tag_field="type", tag="error"):
     """Why a command of this viewer was not executed."""
 
     detail: str
+    command: Annotated[str | None, Meta(description="its type, where it could be read")] = None
 
 
 class Accepted(Struct, frozen=True):
@@ -253,7 +257,7 @@ def _belief(snapshot: Snapshot) -> BeliefSummary | None:
 def _simulation(status: SimulationStatus | None) -> Simulation | None:
     if status is None:
         return None
-    return Simulation(status.world, status.sensor, status.is_covered, status.amcl)
+    return Simulation(status.world, status.sensor, status.is_covered, status.amcl, status.path)
 
 
 def _amcl(snapshot: Snapshot) -> Amcl | None:

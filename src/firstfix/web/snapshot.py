@@ -79,13 +79,17 @@ class AmclEstimate:
 
 @dataclass(frozen=True, slots=True)
 class SimulationStatus:
-    """What viewers can change in the simulation: world, sensor, clock, cover, and plain AMCL."""
+    """What viewers can change in the simulation: world, sensor, clock, cover, AMCL, and a goal.
+
+    The `path` to a goal has its corners in the map frame, m; it is empty if there is no goal.
+    """
 
     world: str
     sensor: str
     is_paused: bool = False
     is_covered: bool = False
     amcl: AmclStart = AmclStart.OFF
+    path: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False, slots=True)

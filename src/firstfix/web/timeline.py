@@ -6,7 +6,8 @@ from collections import deque
 
 from msgspec import Struct
 
-from firstfix.core.odometry import Signal
+from firstfix.core.odometry import Odometry, Signal
+from firstfix.core.scan import LaserScan
 from firstfix.localizer.inputs import Input, NewMap, PoseHint, Reset
 from firstfix.localizer.outputs import InitialPose, Output, Status
 from firstfix.localizer.states import State
@@ -27,7 +28,7 @@ class Event(Struct, frozen=True, tag_field="type", tag="event"):
     stamp : float
         Time, s.
     kind : str
-        state, found, lost, hint, lifted, map, person or warning.
+        state, found, lost, hint, refused, lifted, map, person or warning.
     text : str
         One sentence.
     """
@@ -78,6 +79,8 @@ class Timeline:
                 self.add(output.stamp, "found", f"Localized at {where}: {output.reason}")
             elif before is not output.state and State.LIFTED in (before, output.state):
                 self._add_lift(given, output)
+            elif _is_rejection(given, before, output):
+                self.add(output.stamp, "refused", _sentence(output.reason))
             elif before is not output.state and not isinstance(given, _WITH_OWN_EVENT):
                 self._add_change(given, before, output)
 
@@ -93,3 +96,18 @@ class Timeline:
             self.add(status.stamp, "lifted", f"Picked up: {sensor}")
         else:
             self.add(status.stamp, "lifted", "Set down")
+
+
+def _is_rejection(given: Input, before: State, status: Status) -> bool:
+    """Return whether a proposed pose was refused at once, or rejected by a scan."""
+    if isinstance(given, PoseHint):
+        return status.state not in {State.VERIFYING_HINT, State.LIFTED, State.NO_MAP}
+    return before is State.VERIFYING_HINT and status.state is State.SEARCHING and _is_scan(given)
+
+
+def _is_scan(given: Input) -> bool:
+    return isinstance(given, LaserScan | Odometry)
+
+
+def _sentence(reason: str) -> str:
+    return reason[:1].upper() + reason[1:]

@@ -82,10 +82,13 @@ async def _receive_commands(socket: WebSocket, viewer: Viewer, page: Page) -> No
         if not rate_limiter.admits(""):
             viewer.refuse("Too many commands. This one was ignored.")
             continue
+        command = None
         try:
-            await _execute(decode(text, ClientMessage), page)
+            message = decode(text, ClientMessage)
+            command = f"{message.__struct_config__.tag}"
+            await _execute(message, page)
         except InputError as error:
-            viewer.refuse(str(error))
+            viewer.refuse(str(error), command)
 
 
 async def _execute(message: ClientMessage, page: Page) -> None:

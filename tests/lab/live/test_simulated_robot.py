@@ -249,3 +249,15 @@ def test_the_same_world_can_be_restarted_and_the_hotel_starts_where_a_motion_dec
     assert robot.step().stamp == 0.0
     robot.select_world("hotel")
     assert robot.T_map_base == HOTEL_START
+
+
+def test_the_path_to_a_goal_is_shown_until_it_arrives_or_is_interrupted(robot):
+    goal, elsewhere = random_free_poses(HOUSE, np.random.default_rng(1), 2, 0.5)
+    robot.drive_to(goal.x, goal.y)
+    assert robot.status.path[-1] == pytest.approx((goal.x, goal.y), abs=1e-3)
+    step_until(robot, lambda moment: not robot.status.path)
+    assert np.hypot(robot.T_map_base.x - goal.x, robot.T_map_base.y - goal.y) < 0.2
+    robot.drive_to(elsewhere.x, elsewhere.y)
+    assert robot.status.path
+    robot.kidnap()
+    assert robot.status.path == ()

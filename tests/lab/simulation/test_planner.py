@@ -73,7 +73,7 @@ def test_through_a_door_the_way_leads_in_its_middle() -> None:
 
 def test_where_the_robot_does_not_fit_there_is_no_way() -> None:
     planner = Planner(two_rooms(0.4), TIGHTEST)
-    with pytest.raises(InputError, match="goal that can be reached"):
+    with pytest.raises(InputError, match="No path leads"):
         planner.path(SE2(1.0, 1.0, 0.0), SE2(5.0, 1.0, 0.0))
 
 
@@ -94,5 +94,5 @@ def test_from_beside_a_wall_the_way_leads_off_it_first() -> None:
 @pytest.mark.parametrize("place", [SE2(-30.0, 2.0, 0.0), SE2(90.0, 90.0, 0.0)])
 def test_far_from_any_room_is_no_place(place: SE2) -> None:
     planner = Planner(two_rooms(0.9), TIGHTEST)
-    with pytest.raises(InputError, match="a place with room for the robot"):
+    with pytest.raises(InputError, match="no room for the robot"):
         planner.path(place, SE2(1.0, 1.0, 0.0))

@@ -62,6 +62,7 @@ class SimulatedNode:
         self._inbox: Inbox[Input] = Inbox()
         self._starts = robot.starts
         self._amcl: PlainAmcl | None = None
+        self._path = robot.status.path
         self._known: SE2 | None = None  # the last published pose
         self._config = config
         self._localizer = Localizer(config, cache_dir=cache_folder())
@@ -98,10 +99,18 @@ class SimulatedNode:
             self._restart()
         elif moment is not None:
             self._follow_with_amcl(moment)
+            self._show_path()
             self._store.set_truth(moment.T_map_base)
             self._store.skip_time()  # of the simulation
             for event in moment.events:
                 self._handle(event)
+
+    def _show_path(self) -> None:
+        """Show that a goal was reached."""
+        status = self._robot.status
+        if status.path != self._path:
+            self._path = status.path
+            self._store.set_simulation(status)
 
     def _follow_with_amcl(self, moment: Moment) -> None:
         start = self._robot.status.amcl

@@ -7,8 +7,10 @@ import threading
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
+from numpy.typing import NDArray
 
 from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
@@ -67,6 +69,7 @@ class SimulatedRobot:
         self._sensor = next(iter(SENSORS))
         self._is_paused = self._is_covered = False
         self._amcl = AmclStart.OFF
+        self._path: tuple[tuple[float, float], ...] = ()
         self._starts = 0
         self._plan: Iterator[Moment]
         self._enter(world, grid)
@@ -90,7 +93,8 @@ class SimulatedRobot:
     def status(self) -> SimulationStatus:
         """World, sensor, whether the clock is stopped or the sensor covered, and plain AMCL."""
         return SimulationStatus(
-            self._world, self._sensor, self._is_paused, self._is_covered, self._amcl
+            *(self._world, self._sensor, self._is_paused, self._is_covered, self._amcl),
+            self._path,
         )
 
     @property
@@ -132,8 +136,8 @@ class SimulatedRobot:
         goal = SE2(x, y, 0.0)
         with self._lock:
             self._check(goal)
-            self._simulation.planner.path(self.T_map_base, goal)
-            self._plan = self._drive(goal, _GOAL_REST_S)
+            path = self._simulation.planner.path(self.T_map_base, goal)
+            self._plan = self._drive_along(path, goal)
 
     def move(self, turn: float, ahead: float) -> None:
         """Turn (rad) on the spot, then drive straight ahead (m), then wait.
@@ -147,6 +151,7 @@ class SimulatedRobot:
         with self._lock:
             goal = self.T_map_base @ offset
             self._check(goal)
+            self._path = ()
             self._plan = self._turn_and_drive(turn, goal if ahead > 0.0 else None)
 
     def carry_to(self, T_map_base: SE2) -> None:
@@ -159,6 +164,7 @@ class SimulatedRobot:
         """
         with self._lock:
             self._check(T_map_base)
+            self._path = ()
             self._plan = self._be_carried(T_map_base)
 
     def kidnap(self) -> SE2:
@@ -172,6 +178,7 @@ class SimulatedRobot:
         with self._lock:
             self._check_on_floor()
             pose = random_free_pose(self._grid, self._rng, _KIDNAP_CLEARANCE_M)
+            self._path = ()
             self._simulation.robot.place(pose)
             self._plan = Stand(_REST_S).run(self._simulation)
             return pose
@@ -236,6 +243,7 @@ class SimulatedRobot:
         self._radius_m = scenario.kobuki.radius_m
         self._plan = self._start(_SHOWN_S if world in STARTS else _START_S)
         self._world, self._grid = world, grid
+        self._path = ()
         self._starts += 1
 
     def _check(self, place: SE2) -> None:
@@ -254,6 +262,15 @@ class SimulatedRobot:
         with suppress(InputError):  # where no path leads out, it stays
             yield from DriveTo(goal).run(self._simulation)
         yield from Stand(rest_s).run(self._simulation)
+
+    def _drive_along(self, path: NDArray[np.float64], goal: SE2) -> Iterator[Moment]:
+        """Drive to a goal of a person, and show the way there until it arrives."""
+        self._path = tuple((round(x, 3), round(y, 3)) for x, y in path.tolist())
+        return chain(self._drive_and_arrive(goal), Stand(_GOAL_REST_S).run(self._simulation))
+
+    def _drive_and_arrive(self, goal: SE2) -> Iterator[Moment]:
+        yield from self._drive(goal, 0.0)
+        self._path = ()
 
     def _turn_and_drive(self, turn: float, goal: SE2 | None) -> Iterator[Moment]:
         yield from Spin(turn).run(self._simulation)

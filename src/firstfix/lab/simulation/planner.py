@@ -72,9 +72,8 @@ class Planner:
         row, column = self._cell_near(goal)
         if not math.isfinite(costs[row, column]):
             raise InputError(
-                expected=f"a goal that can be reached from ({start.x:.2f}, {start.y:.2f}) m",
-                received=f"({goal.x:.2f}, {goal.y:.2f}) m, behind walls or in a space too narrow",
-                remedy="choose a goal in the same part of the map",
+                f"No path leads to ({goal.x:.2f}, {goal.y:.2f}) m: it is behind walls, or the way "
+                "is too narrow. Pick a goal in the same part of the map."
             )
         cells = way_back(costs, self.weights, row, column)[::-1, ::-1]
         way = self._floor.grid.to_map((cells.astype(np.float64) + 0.5) * self._factor)
@@ -111,9 +110,8 @@ class Planner:
         rows, columns = np.nonzero(np.isfinite(near))
         if len(rows) == 0:
             raise InputError(
-                expected=f"a place with room for the robot within {_TO_BEGINNING_M:g} m",
-                received=f"({place.x:.2f}, {place.y:.2f}) m, where there is none",
-                remedy="choose a place in the free space of the map",
+                f"There is no room for the robot within {_TO_BEGINNING_M:g} m of "
+                f"({place.x:.2f}, {place.y:.2f}) m. Pick a place in free space."
             )
         nearest = np.argmin(np.hypot(rows + low_row - row, columns + low_column - column))
         return int(rows[nearest]) + low_row, int(columns[nearest]) + low_column

@@ -19,6 +19,7 @@ const byId = (id) => document.getElementById(id);
 export class Actions {
   #abilities = new Set();
   #maySteer = false;
+  #asked = null; // {kind, place}: the last command that was given on the map
 
   /**
    * @param {Connection} connection
@@ -114,14 +115,33 @@ export class Actions {
     if (!draft) return;
     const { kind, x, y, yaw } = draft;
     const wrapped = Math.atan2(Math.sin(yaw), Math.cos(yaw));
+    this.#asked = { kind, place: [x, y] };
     if (kind === "goal") {
-      if (this.send({ type: "goal", x, y })) scene.goal = [x, y];
+      if (this.send({ type: "goal", x, y })) scene.wish = [x, y];
     } else {
-      scene.goal = null;
+      scene.wish = null;
       this.send({ type: kind, x, y, yaw: wrapped });
       this.leaveMode();
     }
     this.onChange();
+  }
+
+  /** A command of this viewer was refused: say so where it was given. */
+  refuse({ detail, command }) {
+    if (command === "goal") this.scene.wish = null;
+    this.#answer(detail, command);
+    this.onChange();
+  }
+
+  /** The localizer judged a proposed pose, and did not accept it. */
+  rejectPose(text) {
+    if (this.#asked?.kind === "pose") this.#answer(text, "pose");
+  }
+
+  #answer(text, command) {
+    if (this.#asked?.kind === command) this.notices.showAnswer(text, this.#asked.place);
+    else this.notices.showError(text);
+    this.#asked = null;
   }
 
   pick(id) {
@@ -141,7 +161,7 @@ export class Actions {
 
   kidnap() {
     if (!this.#abilities.has("kidnap")) return;
-    this.scene.goal = null;
+    this.scene.wish = null;
     this.send({ type: "kidnap" });
   }
 

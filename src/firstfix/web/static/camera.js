@@ -6,6 +6,8 @@ const FOLLOW_SCALE = 45; // px per metre, at least, while the robot is followed
 const EASE_MS = 140;
 const LET_GO_PX = 60; // dragging the robot this far from the middle ends following
 const BUTTON_ZOOM = 1.4;
+const SEPARATE_PX = 60; // from one place to the next, so that their symbols do not overlap
+const INSEPARABLE_M = 0.1; // zooming does not help below this distance
 
 const byId = (id) => document.getElementById(id);
 
@@ -32,6 +34,17 @@ export class Camera {
   zoom(factor) {
     this.view.zoomBy(factor);
     this.onChange();
+  }
+
+  /** Zoom in until places that overlap do not; false if they are too near to each other. */
+  separate(places) {
+    const [[x, y], ...others] = places.map(({ pose }) => pose);
+    const nearest = Math.min(...others.map((pose) => Math.hypot(pose[0] - x, pose[1] - y)));
+    if (nearest < INSEPARABLE_M) return false;
+    this.#setFollow(false);
+    this.view.lookAt(x, y);
+    this.zoom(Math.max(SEPARATE_PX / (nearest * this.view.scale), BUTTON_ZOOM));
+    return true;
   }
 
   toggleFollow() {

@@ -1,6 +1,6 @@
 /** Pointers on the map: pan, wheel, pinch; in a mode, press and drag set place and heading. */
 
-import { hypothesisAt } from "./layers/hypotheses.js";
+import { groupAt } from "./layers/groups.js";
 
 const SLOP_PX = 5; // a click may move this far
 const DRAG_PX = 14; // a shorter drag sets no heading
@@ -19,7 +19,7 @@ export class Gestures {
    * @param {HTMLElement} surface
    * @param {View} view
    * @param {Scene} scene
-   * @param {object} on onViewed() after each move of the map by hand; onDraft(), onSet(), onPick(id), onNoDrag(),
+   * @param {object} on onViewed() after each move of the map by hand; onDraft(), onSet(), onPick(id), onGroup(places), onNoDrag(),
    *     onHover(x, y), onLongPress(): boolean
    */
   constructor(surface, view, scene, on) {
@@ -55,7 +55,7 @@ export class Gestures {
   }
 
   #press(at) {
-    if (this.#moved || hypothesisAt(this.view, this.scene.hypotheses, ...at) !== null) return;
+    if (this.#moved || groupAt(this.view, this.scene.hypotheses, ...at) !== null) return;
     if (this.on.onLongPress()) this.#begin(at);
   }
 
@@ -84,8 +84,8 @@ export class Gestures {
   }
 
   #hover(at) {
-    const over = hypothesisAt(this.view, this.scene.hypotheses, ...at);
-    this.on.onHover(this.view.toMap(...at), over);
+    const over = groupAt(this.view, this.scene.hypotheses, ...at);
+    this.on.onHover(this.view.toMap(...at), over?.first.id ?? null);
   }
 
   #drag(before, at) {
@@ -142,14 +142,19 @@ export class Gestures {
       return;
     }
     this.#drop();
-    const hypothesis = hypothesisAt(this.view, this.scene.hypotheses, ...at);
-    if (hypothesis !== null) this.on.onPick(hypothesis);
-    else this.on.onNoDrag();
+    if (!this.#pick(at)) this.on.onNoDrag();
   }
 
   #click(at) {
-    const hypothesis = hypothesisAt(this.view, this.scene.hypotheses, ...at);
-    if (hypothesis !== null) this.on.onPick(hypothesis);
+    this.#pick(at);
+  }
+
+  /** Pick the place at a point, or look closer at several; false if there is none. */
+  #pick(at) {
+    const group = groupAt(this.view, this.scene.hypotheses, ...at);
+    if (group?.members.length === 1) this.on.onPick(group.first.id);
+    else if (group) this.on.onGroup(group.members);
+    return group !== null;
   }
 
   #drop() {

@@ -71,8 +71,13 @@ const panel = new Panel({
 function take(message) {
   if (message.type === "hello") greet(message);
   else if (message.type === "state") takeState(message);
-  else if (message.type === "event") timeline.add(message);
-  else if (message.type === "error") notices.showError(message.detail);
+  else if (message.type === "event") takeEvent(message);
+  else if (message.type === "error") actions.refuse(message);
+}
+
+function takeEvent(event) {
+  timeline.add(event);
+  if (event.kind === "refused") actions.rejectPose(event.text);
 }
 
 function greet(hello) {
@@ -181,6 +186,7 @@ function askForToken() {
 
 function beforeFrame(now) {
   camera.frame(now);
+  notices.placeAnswer(view);
   app.dataset.view = numbers([view.scale, view.x, view.y, ...view.middle]);
 }
 
@@ -217,6 +223,9 @@ new Gestures(byId("overlay"), view, scene, {
   onDraft: redraw,
   onSet: () => actions.set(),
   onPick: (id) => actions.pick(id),
+  onGroup: (places) => {
+    if (!camera.separate(places)) panel.focusPlace(places[0].id);
+  },
   onNoDrag: () => actions.needsDrag(),
   onLongPress: () => actions.enterPoseMode(),
 });

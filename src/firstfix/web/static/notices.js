@@ -7,6 +7,8 @@ const byId = (id) => document.getElementById(id);
 
 export class Notices {
   #errorTimer = 0;
+  #answerTimer = 0;
+  #place = [0, 0];
   #countdown = 0;
   #speakTimer = 0;
   #spoken = "";
@@ -29,6 +31,25 @@ export class Notices {
     this.#errorTimer = setTimeout(() => (box.hidden = true), ERROR_MS);
   }
 
+  /** Answer a command where the person clicked: [x, y] of the map. */
+  showAnswer(text, place) {
+    this.#place = place;
+    byId("answer").textContent = text;
+    byId("answer").hidden = false;
+    clearTimeout(this.#answerTimer);
+    this.#answerTimer = setTimeout(() => (byId("answer").hidden = true), ERROR_MS);
+  }
+
+  /** Keep the answer at its place, and inside of the window. */
+  placeAnswer(view) {
+    const box = byId("answer");
+    if (box.hidden) return;
+    const [px, py] = view.toScreen(...this.#place);
+    const half = box.offsetWidth / 2 + 8;
+    box.style.left = `${Math.min(Math.max(px, half), view.width - half)}px`;
+    box.style.top = `${Math.min(Math.max(py, 0), view.height - box.offsetHeight - 22)}px`;
+  }
+
   showLost(waitMs) {
     clearInterval(this.#countdown);
     const until = performance.now() + waitMs;
@@ -41,12 +62,14 @@ export class Notices {
     this.#countdown = setInterval(show, 500);
     if (byId("connection-lost").hidden) this.speak("Connection to the robot lost.");
     byId("connection-lost").hidden = false;
+    byId("last-known").hidden = false; // what is shown was true when the connection broke
   }
 
   hideLost() {
     clearInterval(this.#countdown);
     if (!byId("connection-lost").hidden) this.speak("Connected again.");
     byId("connection-lost").hidden = true;
+    byId("last-known").hidden = true;
   }
 
   /** Announce to screen readers: the newest text only, at a limited rate. */

@@ -95,6 +95,11 @@ export class Panel {
     });
   }
 
+  /** Move the focus to a place in the list. */
+  focusPlace(id) {
+    byId("places-list").querySelector(`[data-id="${id}"]`)?.focus();
+  }
+
   #newPlace() {
     const item = document.createElement("li");
     const button = document.createElement("button");

@@ -3,10 +3,11 @@
 import { drawAmcl } from "./layers/amcl.js";
 import { drawBelief } from "./layers/belief.js";
 import { drawChanges } from "./layers/changes.js";
-import { drawDraft, drawGoal } from "./layers/draft.js";
+import { drawDraft } from "./layers/draft.js";
+import { drawGoal } from "./layers/goal.js";
 import { drawGrid } from "./layers/grid.js";
 import { drawHypotheses } from "./layers/hypotheses.js";
-import { colourMap, drawMap } from "./layers/map.js";
+import { ColouredMap, drawMap } from "./layers/map.js";
 import { drawParticles } from "./layers/particles.js";
 import { drawRobot, drawTruth } from "./layers/robot.js";
 import { drawScan, drawFieldOfView } from "./layers/scan.js";
@@ -40,7 +41,7 @@ export class Renderer {
 
   /** The colours or the map changed. */
   recolour() {
-    this.#coloured = this.scene.image ? colourMap(this.scene.image, this.colours) : null;
+    this.#coloured = this.scene.image ? new ColouredMap(this.scene.image, this.colours) : null;
     this.#drawnVersion = -1;
     this.invalidate();
   }
@@ -85,7 +86,7 @@ export class Renderer {
     if (shown.trail && scene.trail.length) drawTrail(ctx, view, scene.trail, colours);
     if (shown.scan && scene.scan) drawScan(ctx, view, scene.scan, colours);
     if (shown.particles && scene.particles) drawParticles(ctx, view, scene.particles, colours);
-    if (scene.goal) drawGoal(ctx, view, scene.goal, pose, colours);
+    if (scene.goal) drawGoal(ctx, view, scene.goal, scene.path, pose, colours);
     if (shown.truth && state?.truth) drawTruth(ctx, view, state.truth, colours);
     if (state?.amcl) drawAmcl(ctx, view, state.amcl, colours);
     if (pose) drawRobot(ctx, view, state, colours);

@@ -16,7 +16,7 @@ export class Scene {
     this.changes = null; // the layer of what has changed in the map
     this.mode = "look";
     this.draft = null; // {kind, x, y, yaw}: the command that is being drawn
-    this.goal = null; // [x, y] where the robot was last sent
+    this.wish = null; // [x, y] where the robot was sent, until a path is known
     this.highlighted = null; // id of the hypothesis under the pointer or the focus
     this.shown = { belief: true, scan: true, particles: true, trail: true, truth: true, changes: true };
   }
@@ -56,8 +56,18 @@ export class Scene {
   clearRobot() {
     const { map, image } = this.live;
     Object.assign(this.live, emptyFrame(), { map, image });
-    this.goal = null;
+    this.wish = null;
     this.highlighted = null;
+  }
+
+  /** The path of a simulated robot to its goal, [x, y] of each corner; empty if there is none. */
+  get path() {
+    return this.state?.simulation?.path ?? [];
+  }
+
+  /** The goal of the robot, [x, y], or null. */
+  get goal() {
+    return this.path.at(-1) ?? (this.isLive ? this.wish : null);
   }
 
   /** The places of which a person may choose one; empty once the robot is localized. */
@@ -74,19 +84,13 @@ export class Scene {
     const isOpen = state.state !== "LOCALIZED" && state.hypotheses.length > 0;
     if (!state.pose && !isOpen) live.scan = null;
     if (!state.pose) live.particles = null;
-    this.#arrive(state);
+    if (state.simulation?.path.length) this.wish = null;
   }
 
   takeFrame(frame) {
     if (frame.kind === "scan") this.live.scan = frame;
     else if (frame.kind === "belief") this.live.heat = frame.heat;
     else this.live.particles = frame;
-  }
-
-  #arrive(state) {
-    if (!this.goal) return;
-    const at = state.pose;
-    if (!at || Math.hypot(at[0] - this.goal[0], at[1] - this.goal[1]) < 0.25) this.goal = null;
   }
 }
 

@@ -1,6 +1,7 @@
 /** The command that is being drawn: a pose, a place to set the robot down, a goal. */
 
 import { heading, metres } from "../format.js";
+import { drawFlag } from "./goal.js";
 import { drawArrowhead, robotRadius } from "./robot.js";
 
 const ARROW_PX = 58;
@@ -38,47 +39,6 @@ export function drawDraft(ctx, view, draft, colours) {
   const text = `${metres(draft.x)}, ${metres(draft.y)} m · ${heading(draft.yaw)}`;
   const below = Math.sin(draft.yaw) > -0.3;
   drawTag(ctx, px, py + (below ? 1 : -1) * (radius + 22), text, colours);
-}
-
-/** The current goal. */
-export function drawGoal(ctx, view, goal, pose, colours) {
-  const [px, py] = view.toScreen(goal[0], goal[1]);
-  if (pose) {
-    ctx.beginPath();
-    ctx.moveTo(...view.toScreen(pose[0], pose[1]));
-    ctx.lineTo(px, py);
-    ctx.strokeStyle = colours.goal;
-    ctx.globalAlpha = 0.5;
-    ctx.lineWidth = 1.5;
-    ctx.setLineDash([2, 6]);
-    ctx.stroke();
-    ctx.setLineDash([]);
-    ctx.globalAlpha = 1;
-  }
-  drawFlag(ctx, px, py, colours);
-}
-
-function drawFlag(ctx, px, py, colours) {
-  ctx.save();
-  ctx.translate(px, py);
-  ctx.strokeStyle = ctx.fillStyle = colours.goal;
-  ctx.lineWidth = 2.2;
-  ctx.lineJoin = ctx.lineCap = "round";
-  ctx.beginPath();
-  ctx.ellipse(0, 0, 9, 4, 0, 0, 2 * Math.PI);
-  ctx.globalAlpha = 0.3;
-  ctx.fill();
-  ctx.globalAlpha = 1;
-  ctx.stroke();
-  ctx.beginPath();
-  ctx.moveTo(0, 0);
-  ctx.lineTo(0, -26);
-  ctx.lineTo(16, -20);
-  ctx.lineTo(0, -14);
-  ctx.closePath();
-  ctx.fill();
-  ctx.stroke();
-  ctx.restore();
 }
 
 function drawTag(ctx, px, py, text, colours) {

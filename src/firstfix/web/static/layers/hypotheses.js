@@ -1,20 +1,21 @@
 /** Hypotheses: numbered places where the robot may be, with their probabilities. */
 
 import { percent } from "../format.js";
+import { groupsOf } from "./groups.js";
 import { robotRadius } from "./robot.js";
 
-const LEAST_TARGET_PX = 24; // a finger must be able to hit it
 const FONT = "600 12px system-ui, sans-serif";
 const UNLIKELY = 0.01; // below this probability a hypothesis is small and has no number, unless it is highlighted
 
 export function drawHypotheses(ctx, view, hypotheses, highlighted, colours) {
   // The most likely last, so that it lies on top.
-  for (let i = hypotheses.length - 1; i >= 0; i--) {
-    drawHypothesis(ctx, view, hypotheses[i], i, hypotheses[i].id === highlighted, colours);
+  for (const { first, index, members, probability } of groupsOf(view, hypotheses).reverse()) {
+    const isHighlighted = members.some(({ id }) => id === highlighted);
+    drawHypothesis(ctx, view, { pose: first.pose, probability }, index, members.length, isHighlighted, colours);
   }
 }
 
-function drawHypothesis(ctx, view, { pose, probability }, index, isHighlighted, colours) {
+function drawHypothesis(ctx, view, { pose, probability }, index, count, isHighlighted, colours) {
   const isUnlikely = probability < UNLIKELY && !isHighlighted;
   const radius = isUnlikely ? 5 : Math.max(robotRadius(view), 11);
   ctx.save();
@@ -33,7 +34,8 @@ function drawHypothesis(ctx, view, { pose, probability }, index, isHighlighted, 
   ctx.textBaseline = "middle";
   ctx.fillStyle = isHighlighted ? colours["on-accent"] : colours.hypothesis;
   ctx.fillText(String(index + 1), 0, 0.5);
-  drawLabel(ctx, percent(probability), radius, pose[2], colours);
+  const label = count > 1 ? `${count} places · ${percent(probability)}` : percent(probability);
+  drawLabel(ctx, label, radius, pose[2], colours);
   ctx.restore();
 }
 
@@ -82,16 +84,4 @@ function drawLabel(ctx, text, radius, yaw, colours) {
   ctx.globalAlpha = 1;
   ctx.fillStyle = colours.hypothesis;
   ctx.fillText(text, 0, y);
-}
-
-/** The id of the hypothesis at a point of the window, or null. */
-export function hypothesisAt(view, hypotheses, px, py) {
-  const reach = Math.max(robotRadius(view), LEAST_TARGET_PX);
-  let [best, nearest] = [null, reach];
-  for (const { id, pose } of hypotheses) {
-    const [x, y] = view.toScreen(pose[0], pose[1]);
-    const distance = Math.hypot(px - x, py - y);
-    if (distance < nearest) [best, nearest] = [id, distance];
-  }
-  return best;
 }

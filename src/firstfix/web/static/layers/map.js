@@ -1,28 +1,83 @@
 /** The map, in the colours of the page, turned as its origin says. */
 
-// Of the PNG of the server; values in between come from scaling.
+// Of the PNG of the server; values in between are occupancies.
 const WALL_GREY = 40;
 const UNKNOWN_GREY = 205;
 const FREE_GREY = 255;
-const CRISP_FROM = 1.5; // px of the window per px of the image: from here on cells have edges
+// Darker than this an obstacle is drawn, however few pixels it has.
+const OBSTACLE_GREY = 150;
 
-/**
- * Colour a grey map: walls, free space, and transparent where the map is unknown.
- *
- * @returns {HTMLCanvasElement} the same size as the image
- */
-export function colourMap(image, colours) {
+// A wall of one cell is at least this wide. Two pixels are never drawn as one.
+const LEAST_WALL_PX = 2;
+const BLOCKS = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512];
+
+/** A grey map in the colours of a theme, at every scale: walls, free space, and nothing where it is unknown. */
+export class ColouredMap {
+  #levels = new Map(); // by block: canvas
+
+  constructor(image, colours) {
+    this.width = image.width;
+    this.height = image.height;
+    this.greys = greysOf(image);
+    this.table = colourTable(colours);
+  }
+
+  /** The block of pixels that is drawn as one where a pixel has a size (px of the window). */
+  blockFor(size) {
+    return BLOCKS.find((block) => block * size >= LEAST_WALL_PX) ?? BLOCKS.at(-1);
+  }
+
+  /** A canvas with one pixel per block; the blocks begin at the lower-left corner of the image. */
+  level(block) {
+    if (!this.#levels.has(block)) this.#levels.set(block, this.#draw(block));
+    return this.#levels.get(block);
+  }
+
+  #draw(block) {
+    const canvas = document.createElement("canvas");
+    canvas.width = Math.ceil(this.width / block);
+    canvas.height = Math.ceil(this.height / block);
+    const ctx = canvas.getContext("2d");
+    const pixels = ctx.createImageData(canvas.width, canvas.height);
+    const words = new Uint32Array(pixels.data.buffer);
+    for (let row = 0; row < canvas.height; row++) {
+      const bottom = this.height - (canvas.height - 1 - row) * block;
+      for (let column = 0; column < canvas.width; column++) {
+        words[row * canvas.width + column] = this.table[this.#pooled(column * block, bottom, block)];
+      }
+    }
+    ctx.putImageData(pixels, 0, 0);
+    return canvas;
+  }
+
+  /** The grey of a block: its darkest obstacle, or what most of it is. */
+  #pooled(left, bottom, block) {
+    const { width, greys } = this;
+    if (block === 1) return greys[(bottom - 1) * width + left];
+    const [right, top] = [Math.min(left + block, width), Math.max(bottom - block, 0)];
+    let [darkest, unknown, sum] = [FREE_GREY, 0, 0];
+    for (let y = top; y < bottom; y++) {
+      for (let i = y * width + left; i < y * width + right; i++) {
+        const grey = greys[i];
+        if (grey < darkest) darkest = grey;
+        if (grey === UNKNOWN_GREY) unknown += 1;
+        else sum += grey;
+      }
+    }
+    const count = (right - left) * (bottom - top);
+    if (darkest < OBSTACLE_GREY) return darkest;
+    return 2 * unknown > count ? UNKNOWN_GREY : Math.round(sum / (count - unknown));
+  }
+}
+
+function greysOf(image) {
   const canvas = document.createElement("canvas");
   canvas.width = image.width;
   canvas.height = image.height;
   const ctx = canvas.getContext("2d", { willReadFrequently: true });
   ctx.drawImage(image, 0, 0);
-  const pixels = ctx.getImageData(0, 0, image.width, image.height);
-  const words = new Uint32Array(pixels.data.buffer);
-  const table = colourTable(colours);
-  for (let i = 0; i < words.length; i++) words[i] = table[words[i] & 255];
-  ctx.putImageData(pixels, 0, 0);
-  return canvas;
+  const words = new Uint32Array(ctx.getImageData(0, 0, image.width, image.height).data.buffer);
+  return Uint8Array.from(words, (word) => word & 255);
 }
 
 function colourTable(colours) {
@@ -54,17 +109,19 @@ export function boundsOf(map) {
   };
 }
 
-/** Draw the map; `canvas` is what colourMap made: row 0 at the top, the lower-left corner the map's. */
-export function drawMap(ctx, view, map, canvas) {
+/** Draw the map; its lower-left corner is that of the image. */
+export function drawMap(ctx, view, map, coloured) {
   const [x0, y0, yaw] = map.origin;
   const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
-  const high = canvas.height * map.image.resolution;
+  const block = coloured.blockFor(view.scale * map.image.resolution);
+  const canvas = coloured.level(block);
+  const side = block * map.image.resolution; // m
+  const high = canvas.height * side;
   const [left, top] = view.toScreen(x0 - sin * high, y0 + cos * high);
-  const size = view.scale * map.image.resolution; // px of the window per px of the image
+  const size = view.scale * side;
   ctx.save();
   ctx.transform(size * cos, -size * sin, size * sin, size * cos, left, top);
-  ctx.imageSmoothingEnabled = size * devicePixelRatio < CRISP_FROM;
-  ctx.imageSmoothingQuality = "medium";
+  ctx.imageSmoothingEnabled = false; // it would make thin walls pale
   ctx.drawImage(canvas, 0, 0);
   ctx.restore();
 }
