@@ -13,7 +13,7 @@ from firstfix.belief.prior import Near
 from firstfix.belief.view import View
 from firstfix.core.angles import angle_error
 from firstfix.core.estimate import Verdict
-from firstfix.core.grid import OccupancyGrid
+from firstfix.core.grid import OCCUPIED, OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
@@ -21,6 +21,7 @@ from firstfix.lab.simulation.lidar import Lidar
 
 WIDE = Lidar(beams=180, sigma_m=0.01)
 START = SE2(10.5, 2.0, 1.8)
+ODOMETRY_START = SE2(-4.0, 2.0, 0.7)
 TURN = [SE2(0.3, 0.0, -0.35)] * 10
 
 
@@ -169,10 +170,41 @@ def test_odometry_that_slips_a_tenth_keeps_the_place(halls, drive):
     assert is_at(belief.places[0].pose, end_of(START, steps))
 
 
+def test_odometry_that_turns_too_far_keeps_the_place(room, drive):
+    """Each turn is reported 9 degrees too large: adjustment alone ends at a wrong heading."""
+    truth, steps = SE2(5.0, 2.5, 0.4), [SE2(0.3, 0.0, 0.6)] * 8
+    views = drive(room.grid, truth, steps, WIDE)
+    odometry, wrong = ODOMETRY_START, [views[0]]
+    for view in views[1:]:
+        odometry = odometry @ SE2(0.3, 0.0, 0.6 + math.radians(9.0))
+        wrong.append(View(view.scans, odometry))
+    beliefs = beliefs_of(wrong, room)
+    assert is_at(beliefs[-1].places[0].pose, end_of(truth, steps))
+    assert {belief.tracks.ids[0] for belief in beliefs} == {beliefs[0].tracks.ids[0]}
+    assert beliefs[-1].tracks.costs[0].max() < 0.3
+
+
 def test_ids_last_while_the_robot_moves(halls, drive):
     beliefs = beliefs_of(drive(halls.grid, START, TURN), halls)
     final = beliefs[-1].places[0].id
     assert sum(final in belief.tracks.ids for belief in beliefs) >= len(beliefs) - 2
+
+
+def test_a_view_of_long_ago_still_counts(four_rooms, drive):
+    """Rooms are identical but for a block that the robot saw at first: it is not forgotten."""
+    cells = four_rooms.grid.cells.copy()
+    cells[40:52, 40:52] = OCCUPIED
+    fields = MapFields(OccupancyGrid(cells, four_rooms.grid.resolution, four_rooms.grid.T_map_grid))
+    corner = SE2(*fields.grid.to_map(np.array([70.0, 46.0])).tolist(), math.pi)
+    look_away = [SE2(0.0, 0.0, 0.35)] * 5
+    there = beliefs_of(drive(fields.grid, corner, look_away + [SE2(0.0, 0.0, 0.2)] * 9), fields)
+    assert len(there[-1].window) > there[-1].config.window
+    assert there[-1].probabilities[0] > 0.9
+    short = BeliefConfig(memory=0)
+    forgetful = beliefs_of(
+        drive(fields.grid, corner, look_away + [SE2(0.0, 0.0, 0.2)] * 9), fields, config=short
+    )
+    assert forgetful[-1].probabilities[0] < 0.6
 
 
 def test_a_robot_that_is_carried_away_is_found_again(halls, drive):

@@ -151,3 +151,43 @@ def test_poses_and_beams_are_not_changed(yard):
     verify(poses, beams, yard)
     for now, then in zip((poses, beams.bearings, beams.ranges, beams.hit), before, strict=True):
         np.testing.assert_array_equal(now, then)
+
+
+@pytest.fixture(scope="module")
+def thick() -> MapFields:
+    """10 x 8 m with a wall 1.2 m thick from x = 6 m on, and a thin one at x = 8.5 m."""
+    cells = np.zeros((160, 200), np.int8)
+    cells[:, 120:144] = OCCUPIED
+    cells[:, 170:172] = OCCUPIED
+    return MapFields(OccupancyGrid(cells, RESOLUTION))
+
+
+@pytest.mark.parametrize(
+    ("range_m", "kind"),
+    [
+        (4.2, BeamClass.EXPLAINED),
+        (4.4, BeamClass.THROUGH_WALL),
+        (5.1, BeamClass.THROUGH_WALL),  # near the far side
+        (6.52, BeamClass.THROUGH_WALL),  # on the next wall
+    ],
+)
+def test_a_beam_that_ends_deep_in_a_wall_goes_through_it(thick, range_m, kind):
+    assert beam_classes(SENSOR[0], beam(EAST, range_m), thick).tolist() == [kind]
+
+
+@pytest.mark.parametrize(
+    ("deep", "kind"), [(0.25, BeamClass.EXPLAINED), (0.4, BeamClass.THROUGH_WALL)]
+)
+def test_a_beam_along_a_wall_may_be_long_in_it_but_not_deep(thick, deep, kind):
+    grazing = 1.0
+    length = (4.0 + deep) / np.cos(grazing)  # 0.46 m of it in the wall, or 0.74 m
+    south = np.array([2.0 / RESOLUTION, 0.3 / RESOLUTION, 0.0])
+    assert beam_classes(south, beam(grazing, length), thick).tolist() == [kind]
+
+
+def test_a_beam_along_a_wall_of_usual_thickness_goes_through_it(yard):
+    grazing = 0.5
+    length = 4.25 / np.cos(grazing)  # just behind the wall, in free space
+    south = np.array([2.0 / RESOLUTION, 0.3 / RESOLUTION, 0.0])
+    through = [beam_classes(south, beam(grazing, r), yard)[0] for r in (length, length + 0.3)]
+    assert BeamClass.THROUGH_WALL in through

@@ -11,19 +11,15 @@ from numpy.typing import NDArray
 
 from firstfix.belief.config import BeliefConfig
 from firstfix.belief.enter import propose
-from firstfix.belief.evidence import (
-    ODOMETRY_WEIGHT,
-    WRONG_MAP_COST,
-    exponent,
-    log_likelihoods,
-    novelty,
-    shares,
-)
+from firstfix.belief.evidence import WRONG_MAP_COST, shares
 from firstfix.belief.hints import Hint, hint_logs
+from firstfix.belief.joint import joint_log_likelihoods, power_of
 from firstfix.belief.judge import Judgement, Rule, judge
 from firstfix.belief.merge import merge
 from firstfix.belief.place import listed_places
 from firstfix.belief.planar import between, compose, in_cells, to_map
+from firstfix.belief.rejoin import rejoin
+from firstfix.belief.remember import remembered
 from firstfix.belief.tracks import Tracks, at_rest, follow, look_again, trace_back
 from firstfix.belief.view import Observation, View
 from firstfix.core.estimate import Hypothesis, SearchReport, Verdict
@@ -254,14 +250,15 @@ def update(belief: Belief, view: View) -> Belief:
         return _blind(belief, hits)
     window, held = _followed(belief, view)
     entering, search = propose(window, belief.hints, belief.next_id, fields, config)
-    tracks = held.joined_by(_with_past(entering, window, fields))
+    held = rejoin(held, entering, window, fields)
+    tracks = held.joined_by(_with_past(entering, window, belief))
 
     tracks, _ = _ranked(tracks, window, belief)
     best, others = tracks.split(CAREFUL_PLACES)
     tracks = look_again(best, window, fields).joined_by(others)
     tracks, logs = _ranked(tracks, window, belief)
 
-    probabilities, _ = shares(logs, _power(window))
+    probabilities, _ = shares(logs, power_of(window))
     kept = probabilities >= NEGLIGIBLE
     tracks, probabilities = tracks.take(kept), probabilities[kept]
     rule = Rule(config.sure_probability, hinted=_is_hinted(tracks, window, belief))
@@ -311,9 +308,11 @@ def _followed(belief: Belief, view: View) -> tuple[tuple[Observation, ...], Trac
     if _rests(window[-1], view):
         joined = window[-1].joined_by(view)
         return (*window[:-1], joined), at_rest(tracks, joined, fields)
-    kept = 1 if belief.misses >= MOST_MISSES else belief.config.window - 1
-    first = max(0, len(window) - kept)
-    window, tracks = window[first:], tracks.over(slice(first, None))
+    if belief.misses >= MOST_MISSES:
+        window, tracks = window[-1:], tracks.over([len(window) - 1])
+    elif len(window) >= belief.config.window:
+        kept = remembered(window, belief.config)
+        window, tracks = tuple(window[i] for i in kept), tracks.over(kept)
     if not window:
         return (seen,), Tracks.none()
     return (*window, seen), follow(tracks, window[-1], seen, fields)
@@ -325,11 +324,11 @@ def _rests(newest: Observation, view: View) -> bool:
     return not moved and newest.same_sensors(view)
 
 
-def _with_past(entering: Tracks, window: tuple[Observation, ...], fields: MapFields) -> Tracks:
+def _with_past(entering: Tracks, window: tuple[Observation, ...], belief: Belief) -> Tracks:
     """Give places that enter their poses and costs at the earlier views, newest first."""
     for i in range(len(window) - 2, -1, -1):
-        entering = trace_back(entering, window[i], window[i + 1], fields)
-        logs = _joint(entering, window[i:])
+        entering = trace_back(entering, window[i], window[i + 1], belief.fields)
+        logs = joint_log_likelihoods(entering, window[i:], belief.config)
         entering = entering.take(logs >= logs.max(initial=-math.inf) + math.log(NEGLIGIBLE))
     return entering
 
@@ -339,22 +338,13 @@ def _ranked(
 ) -> tuple[Tracks, NDArray[np.float64]]:
     """Merge tracks to places, most likely first, and return their log-likelihoods."""
     grid = belief.fields.grid
-    logs = _joint(tracks, window) + hint_logs(tracks.now, window[-1], belief.hints, grid)
+    logs = joint_log_likelihoods(tracks, window, belief.config)
+    logs += hint_logs(tracks.now, window[-1], belief.hints, grid)
     favourite = belief.judgement.favourite
     known = (favourite.id if favourite is not None else -1, belief.next_id)
     most = belief.config.places
     kept, names = merge(tracks.now, logs, tracks.ids, known, grid.resolution, most)
     return tracks.take(kept).named(names), logs[kept]
-
-
-def _joint(tracks: Tracks, window: tuple[Observation, ...]) -> NDArray[np.float64]:
-    by_views = log_likelihoods(tracks.costs.mean(axis=1), _power(window))
-    by_odometry: NDArray[np.float64] = -ODOMETRY_WEIGHT * tracks.strains.sum(axis=1)
-    return by_views + by_odometry
-
-
-def _power(window: tuple[Observation, ...]) -> float:
-    return exponent(float(novelty(window).sum()), len(window[-1].beams))
 
 
 def _is_hinted(tracks: Tracks, window: tuple[Observation, ...], belief: Belief) -> bool:

@@ -11,7 +11,8 @@ from firstfix.core.settings import check_settings, setting
 class BeliefConfig:
     """How many views and places a belief holds, and when it is sure."""
 
-    window: int = setting(8, "views that are judged together", 1, 100)
+    window: int = setting(8, "latest views that are judged together", 1, 100)
+    memory: int = setting(8, "older views, 2 m apart, that are judged with them", 0, 100)
     first_shortlist: int = setting(600, "places of the first search that enter", 1, 100_000)
     shortlist: int = setting(150, "places of each later search that enter", 1, 100_000)
     places: int = setting(600, "places held at most; the rest counts as elsewhere", 2, 100_000)

@@ -23,9 +23,6 @@ BEAMS_FOR_EXPONENT = 30
 # Mean cost at which the best place of a wrong map begins to be as good as the right one.
 WRONG_MAP_COST = 2.3
 
-# Odometry errs together with itself, as views do.
-ODOMETRY_WEIGHT = 1.0
-
 # A view is new in full if it was taken this far from every later one, or turned by a field of view
 # (by a radian if that is narrower).
 NEW_M = 2.0

@@ -104,13 +104,14 @@ class Tracks:
         """Put the same places over later views behind these."""
         return _joined(self, later, 1, self.ids)
 
-    def over(self, views: slice) -> Tracks:
-        """Keep some of the views."""
+    def over(self, views: slice | Sequence[int]) -> Tracks:
+        """Keep some of the views, in their order."""
+        chosen = views if isinstance(views, slice) else list(views)
         return Tracks(
-            self.poses[:, views],
-            self.costs[:, views],
-            self.strains[:, views],
-            self.careful[:, views],
+            self.poses[:, chosen],
+            self.costs[:, chosen],
+            self.strains[:, chosen],
+            self.careful[:, chosen],
             self.ids,
         )
 

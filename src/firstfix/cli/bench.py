@@ -35,12 +35,13 @@ class Suite(Enum):
 
 
 # Which options belong to which benchmark. --json belongs to all.
-_LOCATE = {"CASES", "--method", "--wrong-map", "--limit", "--sensor", "--jobs", "--report"}
+_CASES = {"CASES", "--floors", "--sensor"}
+_LOCATE = {*_CASES, "--method", "--wrong-map", "--limit", "--jobs", "--report"}
 _OPTIONS = {
     "locating": _LOCATE,
-    "--track": {"CASES", "--params", "--seed", "--sensor", "--jobs"},
-    "--kidnap": {"CASES", "--worlds", "--scenarios", "--seed", "--sensor", "--jobs", "--report"},
-    "--starts": {"CASES", "--runs", "--seed", "--sensor", "--jobs", "--report"},
+    "--track": {*_CASES, "--params", "--seed", "--jobs"},
+    "--kidnap": {*_CASES, "--worlds", "--scenarios", "--seed", "--jobs", "--report"},
+    "--starts": {*_CASES, "--runs", "--seed", "--jobs", "--report"},
     "--suite paper": {"--worlds", "--runs", "--seed", "--jobs", "--report"},
     "--suite scaling": {"--seed", "--report"},
     "--suite ablation": {"CASES", "--limit", "--sensor", "--jobs", "--report"},
@@ -68,6 +69,15 @@ def bench(
             help="Cut the scans to a sensor with this field of view (degrees) and range (m), such "
             "as 60,5; `recorded` leaves them as they are. Repeatable.",
             show_default="recorded",
+        ),
+    ] = None,
+    floors: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FIRST-LAST",
+            help="Also drives on random floors with these seeds, such as 1000-1023: drawn maps, "
+            "and worlds that differ from them.",
+            show_default=False,
         ),
     ] = None,
     json_file: Annotated[
@@ -182,6 +192,7 @@ def bench(
     folders = [*(cases or []), *(more_cases or [])]
     given: dict[str, Any] = {
         "CASES": folders,
+        "--floors": floors,
         "--method": method,
         "--sensor": sensor,
         "--wrong-map": wrong_map,
@@ -201,20 +212,22 @@ def bench(
 
     from firstfix.lab import benchmarks
     from firstfix.lab.experiments.case import find_cases, parse_sensor
+    from firstfix.lab.experiments.floor_cases import floor_case, parse_floors
     from firstfix.lab.experiments.paper_bench import PAPER_WORLDS
     from firstfix.lab.experiments.track_log import load_config
     from firstfix.lab.reports.output_files import check_targets
     from firstfix.lab.worlds.catalog import WORLDS, parse_worlds
 
     sensors = list(dict.fromkeys(parse_sensor(text) for text in sensor or ["recorded"]))
-    found: list[Case] = benchmarks.cut_to_sensors(find_cases(folders), sensors)
+    drawn = [floor_case(number) for number in parse_floors(floors)]
+    found: list[Case] = benchmarks.cut_to_sensors([*find_cases(folders), *drawn], sensors)
     first_seed = seed or 0
     if measure == "--track":
         benchmark = benchmarks.track_benchmark(found, load_config(params, seed).localizer.amcl)
     elif measure == "--starts":
         benchmark = benchmarks.start_benchmark(found, runs or STARTS, first_seed)
     elif measure == "--kidnap":
-        usual = [] if folders else [name for name in WORLDS if name not in _HOPELESS]
+        usual = [] if found else [name for name in WORLDS if name not in _HOPELESS]
         benchmark = benchmarks.kidnap_benchmark(
             usual if worlds is None else parse_worlds(worlds, WORLDS),
             scenarios or KIDNAP_SCENARIOS,
@@ -255,9 +268,9 @@ def _check_options(asked: list[str], given: dict[str, Any]) -> str:
             remedy=f"leave out {', '.join(wrong)}"
             + (f", or ask for {' or '.join(fitting)}" if fitting else ""),
         )
-    if measure not in _WITHOUT_CASES and not given["CASES"]:
+    if measure not in _WITHOUT_CASES and not given["CASES"] and not given["--floors"]:
         raise InputError(
-            expected="CASES: at least one folder of a case, or of cases",
+            expected="CASES: at least one folder of a case, or of cases; or --floors",
             received="none",
             remedy="name one; only --kidnap and --suite paper or scaling can do without",
         )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from firstfix.core.estimate import Evidence, Hypothesis
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
-from firstfix.fields.kernel_cache import kernel
+from firstfix.fields.kernel_cache import kernel, part
 from firstfix.fields.map_fields import MapFields
 from firstfix.fields.raycast import cast_ray_leaping
 from firstfix.global_localization.beams import Beams
@@ -26,7 +26,8 @@ _SIGMA_M = 0.1
 _INLIER, _OUTLIER = 0.96, 0.02
 
 # A beam that passes a wall by more than this goes through it; that costs as much as six beams that
-# end a little off. People and moved chairs make beams short, so a short beam costs little.
+# end a little off. Where walls are drawn too thick, a beam along one is long in it but not deep.
+# People and moved chairs make beams short, so a short beam costs little.
 _THROUGH_M = 0.3
 _THROUGH_COST = 2.0
 _THROUGH_LIMIT_M = 1.0
@@ -204,6 +205,40 @@ def _compared(
     return scores, counts, classes
 
 
+@part
+def _is_shallow(
+    squares: NDArray[np.uint16],
+    clearance: NDArray[np.uint8],
+    start: tuple[float, float],
+    direction: tuple[float, float],
+    stretch: tuple[float, float],
+    deepest: float,
+) -> bool:
+    """Tell whether a beam stays in the wall that it enters, not far from its visible side.
+
+    The stretch from the entry to the end of the beam, and the depth across it, are cells.
+    """
+    height, width = squares.shape
+    length = stretch[1]
+    while length > stretch[0]:
+        x, y = start[0] + length * direction[0], start[1] + length * direction[1]
+        if squares[math.floor(y), math.floor(x)] != 0:
+            return False
+        length -= 1.0
+    for side in (-deepest, deepest):
+        across_x = stretch[1] * direction[0] - side * direction[1]
+        across_y = stretch[1] * direction[1] + side * direction[0]
+        away = math.sqrt(across_x * across_x + across_y * across_y)
+        column, row = math.floor(start[0] + across_x), math.floor(start[1] + across_y)
+        if 0 <= column < width and 0 <= row < height and squares[row, column] != 0:
+            seen = cast_ray_leaping(
+                clearance, start[0], start[1], across_x / away, across_y / away, away
+            )
+            if seen >= away:
+                return True
+    return False
+
+
 @kernel
 def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
     poses: NDArray[np.float64],
@@ -243,7 +278,19 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
                 clearance, start_x, start_y, dx, dy, reach / resolution
             )
             gap = ranges[i] - expected
+            x = math.floor(start_x + ranges[i] / resolution * dx)
+            y = math.floor(start_y + ranges[i] / resolution * dy)
+            inside = 0 <= x < width and 0 <= y < height
             through = gap > _THROUGH_M
+            if through and hit[i] and inside and squares[y, x] == 0:
+                through = not _is_shallow(
+                    squares,
+                    clearance,
+                    (start_x, start_y),
+                    (dx, dy),
+                    (expected / resolution, ranges[i] / resolution),
+                    _THROUGH_M / resolution,
+                )
             differs = min(gap, _THROUGH_LIMIT_M) if gap > 0.0 else min(-gap, _SHORT_LIMIT_M)
             if through:
                 differs += _THROUGH_COST
@@ -252,9 +299,6 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
                 classes[k, i] = _THROUGH if through else _EXPLAINED
                 counts[k, classes[k, i]] += 1
                 continue
-            x = math.floor(start_x + ranges[i] / resolution * dx)
-            y = math.floor(start_y + ranges[i] / resolution * dy)
-            inside = 0 <= x < width and 0 <= y < height
             distance = distances_m[squares[y, x]] if inside else _FAR_M
             near = math.exp(-0.5 * (distance / _SIGMA_M) ** 2)
             cost += weights[i] * (differs - math.log(_INLIER * near + _OUTLIER))

@@ -10,14 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.belief.belief import NEWS_M, NEWS_RAD, Belief, begin, update
-from firstfix.belief.evidence import (
-    ODOMETRY_WEIGHT,
-    WRONG_MAP_COST,
-    exponent,
-    log_likelihoods,
-    novelty,
-)
+from firstfix.belief.evidence import WRONG_MAP_COST, log_likelihoods
 from firstfix.belief.hints import hint_logs
+from firstfix.belief.joint import joint_log_likelihoods, power_of
 from firstfix.belief.prior import FLOOR
 from firstfix.belief.several import distinct_views
 from firstfix.belief.view import View
@@ -126,9 +121,7 @@ def _logs(belief: Belief) -> NDArray[np.float64]:
 
 def joint_logs(belief: Belief) -> NDArray[np.float64]:
     """Return log-likelihoods of a belief's places by its views, shape (n,); a wrong map has 0."""
-    power = exponent(float(novelty(belief.window).sum()), len(belief.window[-1].beams))
-    costs = np.append(belief.tracks.costs.mean(axis=1), WRONG_MAP_COST)
-    logs = log_likelihoods(costs, power)
-    strains = ODOMETRY_WEIGHT * belief.tracks.strains.sum(axis=1)
-    joint: NDArray[np.float64] = logs[:-1] - logs[-1] - strains
+    nowhere = log_likelihoods(np.array([WRONG_MAP_COST]), power_of(belief.window))
+    logs = joint_log_likelihoods(belief.tracks, belief.window, belief.config)
+    joint: NDArray[np.float64] = logs - nowhere
     return joint
