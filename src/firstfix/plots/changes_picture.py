@@ -65,7 +65,7 @@ def draw_changes(changes: MapChanges, path: Path, title: str) -> Path:
             zorder=6,
         )
     axes.set_title(title, wrap=True)
-    figure.legend(loc="outside lower center", ncols=2)
+    figure.legend(loc="outside lower center", ncols=2, markerscale=3.0)
     return save_figure(figure, path)
 
 
