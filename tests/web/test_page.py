@@ -40,7 +40,10 @@ def test_the_robot_appears(
     page.wait_for_fix()
     assert page.page.inner_text("#state-word") == "LOCALIZED"
     assert page.page.inner_text("#map-name") == "office"
-    assert re.search(r"beams fit|fits here", page.page.inner_text("#reason"))
+    reason = page.page.locator("#reason")
+    wait_until(
+        lambda: re.fullmatch(r"\d+% of the beams fit\.", reason.inner_text()), reason.inner_text
+    )
     assert page.page.is_visible("#tools")
     x, y, yaw = page.pose()
     aside = 6.0 / page.scale  # of the white arrow in the middle of the robot

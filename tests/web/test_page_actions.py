@@ -15,7 +15,7 @@ from firstfix.lab.worlds.catalog import WORLDS, random_free_poses
 
 pytestmark = pytest.mark.slow
 
-ORIGIN = WORLDS["rooms"]().extent[0], WORLDS["rooms"]().extent[2]
+ORIGIN = np.array([WORLDS["rooms"]().extent[0], WORLDS["rooms"]().extent[2]])
 
 Visitor = Callable[..., Visit]
 
@@ -171,7 +171,7 @@ def test_picking_a_place_resolves_an_ambiguous_start(
     assert page.colour_of("#state h2") == page.colour_variable("chosen")
 
 
-OFFSETS_M = (-0.35, -0.2, 0.2, 0.35)
+HEAT_CELL_M = 0.5
 
 
 def test_the_belief_is_a_heat_layer(visit: Visitor, rooms_server: Server) -> None:
@@ -185,17 +185,23 @@ def test_the_belief_is_a_heat_layer(visit: Visitor, rooms_server: Server) -> Non
     )
     page.page.click("#pause")
     page.page.wait_for_selector("#paused", state="visible")
-    x, y, _ = rooms_server.status()["hypotheses"][0]["pose"]
-    page.look_at(x, y, 100.0)
-    # Around the place: symbols drawn over the layer hide some of these points, not all.
-    around = [(x + dx, y + dy) for dx in OFFSETS_M for dy in OFFSETS_M]
+    place = np.array(rooms_server.status()["hypotheses"][0]["pose"][:2])
+    for layer in ("scan", "truth"):
+        page.page.click(f"[data-layer={layer}]")
+    page.look_at(*place, 400.0)
     page.page.wait_for_timeout(300)
-    shown = [page.colour("overlay", *point) for point in around]
+    corner = ORIGIN + HEAT_CELL_M * np.floor((place - ORIGIN) / HEAT_CELL_M)
+    steps = HEAT_CELL_M * np.linspace(0.1, 0.9, 9)
+    cell = corner + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    points = cell[np.hypot(*(cell - place).T) > 0.27]  # beside the symbol of the place
+    assert len(points) >= 3
+    shown = [page.colour("overlay", *point) for point in points]
     page.page.click("[data-layer=belief]")
     page.page.wait_for_timeout(300)
-    hidden = [page.colour("overlay", *point) for point in around]
+    hidden = [page.colour("overlay", *point) for point in points]
     page.page.click("#pause")
-    assert shown != hidden
+    assert all(alpha > 100 and blue > green + 40 for _, green, blue, alpha in shown), shown
+    assert set(hidden) == {(0, 0, 0, 0)}
 
 
 def test_a_carried_robot_is_lifted_and_localized_again(page: Visit) -> None:
