@@ -98,6 +98,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "update_min_a": {"to": 2.0, "with": {"update_min_d": 3.0}},
     "random_seed": {"to": 7},
     "deskew": {"to": False, "in": "a slow laser"},
+    "changes.days_kept": {"to": 2},
     "locate.max_poses": {"to": 1000},
     "locate.shortlist": {"to": 1},
     "locate.unique_probability": {"to": 1.0},
@@ -180,7 +181,9 @@ class Drive:
         node._check_scans()
         node._memory.close()
         topics = sorted(topic.name for _, topic in subscriptions(config))
-        return [*topics, *map(str, recorder.published), *map(str, recorder.lines)]
+        # What the live page shows of changes of the map.
+        changes = f"changes: {node._localizer.changes is not None}"
+        return [*topics, *map(str, recorder.published), *map(str, recorder.lines), changes]
 
 
 @pytest.fixture(scope="module")
