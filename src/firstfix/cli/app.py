@@ -20,6 +20,7 @@ from firstfix import __version__
 from firstfix.cli.bench import bench
 from firstfix.cli.demo import demo
 from firstfix.cli.doctor import cache_advice, doctor
+from firstfix.cli.fleet import fleet_app
 from firstfix.cli.locate import locate
 from firstfix.cli.map import map_app
 from firstfix.cli.nodes import AFTER_DASHES, PASSED_ON, dds, ros1, ros2
@@ -46,6 +47,7 @@ app.command()(track)
 app.command()(bench)
 app.add_typer(map_app, name="map")
 app.add_typer(site_app, name="site")
+app.add_typer(fleet_app, name="fleet")
 app.command()(demo)
 app.command(context_settings=AFTER_DASHES)(serve)
 app.command(context_settings=PASSED_ON)(ros1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,7 +23,7 @@ class Looked:
     recall : float
         Probability that the right map is among `promising`, measured on other buildings.
     most : int
-        Number of maps in `promising`.
+        Number of maps in `promising`; may be more than there are in this part of the site.
     """
 
     map_ids: tuple[str, ...]
@@ -55,4 +56,4 @@ class Looked:
 
 def look_at_all(map_ids: Sequence[str]) -> Looked:
     """Find every map promising."""
-    return Looked(tuple(map_ids), np.zeros(len(map_ids)), recall=1.0, most=len(map_ids))
+    return Looked(tuple(map_ids), np.zeros(len(map_ids)), recall=1.0, most=sys.maxsize)

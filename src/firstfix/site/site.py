@@ -148,12 +148,22 @@ class Site:
         done : callable
             Called with the id of each map when it is ready, or found to be unusable.
         """
-        for entry in self._entries.values():
-            if self._is_usable(entry):
-                self.fields(entry.id).compute(*FIELDS)
-            done(entry.id)
+        for map_id in self._entries:
+            self.prepare_map(map_id)
+            done(map_id)
         if self._cache_dir is not None:
             remove_unused(self._cache_dir, UNUSED_DAYS)
+
+    def prepare_map(self, map_id: str) -> None:
+        """Prepare one map now; `faults` says if it is unusable.
+
+        Raises
+        ------
+        InputError
+            If there is no such map.
+        """
+        if self._is_usable(self._entry(map_id)):
+            self.fields(map_id).compute(*FIELDS)
 
     def locate(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
+from collections.abc import Collection
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
@@ -62,12 +63,21 @@ class AccessControl:
         The policy.
     rate_limiter : RateLimiter
         Limits the requests of each client.
+    open_paths : collection of str
+        What everyone may read, beside ``/static/``.
     """
 
-    def __init__(self, app: ASGIApp, access: AccessPolicy, rate_limiter: RateLimiter) -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        access: AccessPolicy,
+        rate_limiter: RateLimiter,
+        open_paths: Collection[str] = ("/",),
+    ) -> None:
         self._app = app
         self._access = access
         self._rate_limiter = rate_limiter
+        self._open_paths = frozenset(open_paths)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request or connection."""
@@ -100,7 +110,7 @@ class AccessControl:
         is_reading = scope["type"] == "http" and scope["method"] in _READING
         if origin is not None and not is_reading and _host_of(origin) != host:
             return problem(403, "Requests from other web sites are refused.")
-        if scope["path"] == "/" or scope["path"].startswith("/static/"):
+        if scope["path"] in self._open_paths or scope["path"].startswith("/static/"):
             return None
         client = client_of(scope)
         if not self._rate_limiter.admits(client):

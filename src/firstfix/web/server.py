@@ -143,14 +143,19 @@ def make_server(page: Page) -> uvicorn.Server:
     uvicorn.Server
         ``run(sockets=[listening])`` serves until a signal, or until ``should_exit`` is set.
     """
+    return server_of(make_app(page))
+
+
+def server_of(app: ASGIApp, most_connections: int = _MOST_CONNECTIONS) -> uvicorn.Server:
+    """Make a server of an ASGI application, as `make_server`."""
     config = uvicorn.Config(
-        make_app(page),
+        app,
         access_log=False,
         log_level="warning",
         # uvicorn's own configuration would close the log handlers of the program.
         log_config=None,
         http="h11",
-        limit_concurrency=_MOST_CONNECTIONS,
+        limit_concurrency=most_connections,
         # Any client can forge these headers.
         proxy_headers=False,
         server_header=False,

@@ -1,0 +1,1 @@
+"""A service that locates many robots in many maps."""

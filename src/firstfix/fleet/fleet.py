@@ -1,0 +1,166 @@
+"""One joint verdict over maps that are spread over workers."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+from firstfix.core.errors import InputError
+from firstfix.fleet.engine import Engine, WorkerLostError
+from firstfix.fleet.jobs import Job, Look, Prepare, Search
+from firstfix.site.judge import judge_site
+from firstfix.site.look import Looked
+from firstfix.site.query import SiteQuery
+from firstfix.site.result import SiteResult
+
+T = TypeVar("T")
+
+TRIALS = 4
+"""How often a job is given to a worker that is lost each time."""
+
+_FIRST_PAUSE_S = 0.2
+"""Before the second trial; doubled each time."""
+
+
+class UnknownMapError(InputError):
+    """A map that is not in the site."""
+
+
+class NotReadyError(Exception):
+    """The query cannot be answered now; its text is a sentence."""
+
+
+@dataclass(eq=False)
+class Fleet:
+    """Locates robots in a site.
+
+    Parameters
+    ----------
+    engine : Engine
+        Runs the workers.
+    shards : tuple of tuple of str
+        Ids of the maps of each worker.
+    """
+
+    engine: Engine
+    shards: tuple[tuple[str, ...], ...]
+    prepared: set[str] = field(default_factory=set)
+    faults: dict[str, str] = field(default_factory=dict)
+    memory: dict[int, int] = field(default_factory=dict)
+    lost_workers: int = 0
+
+    @property
+    def map_ids(self) -> tuple[str, ...]:
+        """All maps of the site, usable or not."""
+        return tuple(sorted(name for shard in self.shards for name in shard))
+
+    @property
+    def is_ready(self) -> bool:
+        """True when every map is prepared or known to be unusable."""
+        return len(self.prepared) + len(self.faults) == sum(map(len, self.shards))
+
+    async def prepare(self) -> None:
+        """Prepare all maps, each worker one after the other."""
+        await asyncio.gather(*(self._prepare(i) for i in range(len(self.shards))))
+
+    async def locate(self, query: SiteQuery, only: str | None = None) -> SiteResult:
+        """Find the map and the place of a robot.
+
+        Parameters
+        ----------
+        query : SiteQuery
+            What is asked.
+        only : str, optional
+            The map of the robot, where it is known; no other one is looked at.
+
+        Returns
+        -------
+        SiteResult
+            One verdict over all maps.
+
+        Raises
+        ------
+        UnknownMapError
+            If the query names a map that is not in the site.
+        InputError
+            If the query cannot be answered.
+        NotReadyError
+            If maps are not prepared yet, or a worker was lost again and again.
+        """
+        started = time.perf_counter()
+        parts = self._usable(query, only)
+        looked = await self._all([(i, Look(query, names)) for i, names in parts])
+        promising = set(Looked.joined(looked).promising)
+        chosen = [(i, tuple(n for n in names if n in promising)) for i, names in parts]
+        found = await self._all([(i, Search(query, names)) for i, names in chosen if names])
+        result = await asyncio.to_thread(judge_site, query, looked, found)
+        return replace(
+            result,
+            faults=tuple(self.faults.values()),
+            elapsed_s=time.perf_counter() - started,
+        )
+
+    def check_maps(self, map_ids: Sequence[str]) -> None:
+        """Raise UnknownMapError if one of the maps is not in the site."""
+        known = set(self.map_ids)
+        for name in map_ids:
+            if name not in known:
+                listed = ", ".join(self.map_ids[:5]) + (", ..." if len(known) > 5 else "")
+                raise UnknownMapError(
+                    f"There is no map {name!r:.60} in this site. Choose one of {listed}."
+                )
+
+    def _usable(self, query: SiteQuery, only: str | None) -> list[tuple[int, tuple[str, ...]]]:
+        """Return the maps to look at, by worker."""
+        self.check_maps([*(query.prior or {}), *([] if only is None else [only])])
+        if only in self.faults:
+            raise NotReadyError(self.faults[only])
+        asked = self.map_ids if only is None else (only,)
+        if missing := [n for n in asked if n not in self.prepared and n not in self.faults]:
+            raise NotReadyError(
+                f"{len(missing)} of {len(asked)} maps are not prepared yet. Try again later."
+            )
+        parts = [
+            (i, tuple(n for n in shard if n in self.prepared and only in {None, n}))
+            for i, shard in enumerate(self.shards)
+        ]
+        usable = [(i, names) for i, names in parts if names]
+        if not usable:
+            raise NotReadyError("No map of the site can be used. GET /v1/maps says why.")
+        return usable
+
+    async def _prepare(self, worker: int) -> None:
+        for map_id in self.shards[worker]:
+            try:
+                fault = await self._ask(worker, Prepare(map_id))
+            except NotReadyError:
+                fault = f"The map {map_id} cannot be used: each worker that prepares it is lost."
+            if fault is None:
+                self.prepared.add(map_id)
+            else:
+                self.faults[map_id] = fault
+
+    async def _all(self, asked: Sequence[tuple[int, Job[T]]]) -> list[T]:
+        """Let several workers work at once; if one fails, wait for no other."""
+        return list(await asyncio.gather(*(self._ask(worker, job) for worker, job in asked)))
+
+    async def _ask(self, worker: int, job: Job[T]) -> T:
+        pause = _FIRST_PAUSE_S
+        for trial in range(TRIALS):
+            if trial:
+                await asyncio.sleep(pause)
+                pause *= 2
+            try:
+                done = await self.engine.ask(worker, job)
+            except WorkerLostError:
+                self.lost_workers += 1
+                continue
+            self.memory[worker] = done.memory
+            return done.result
+        raise NotReadyError(
+            "A part of the maps cannot be reached: its worker was lost and is started again. "
+            "Try again later."
+        )

@@ -1,0 +1,160 @@
+"""What the workers of a fleet service do: each job and its result can be pickled."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic, Protocol, TypeVar
+
+from firstfix.core.errors import FirstfixError
+from firstfix.io.maps.site_yaml import SiteMap, read_site
+from firstfix.site.look import Looked
+from firstfix.site.places import SiteCandidates
+from firstfix.site.query import SiteQuery
+from firstfix.site.site import Site
+
+T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
+
+
+class Job(Protocol[T_co]):
+    """Something that a worker does with its maps."""
+
+    def run(self, site: Site) -> T_co:
+        """Do it."""
+        ...
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Prepare:
+    """Prepare one map; the result is a sentence if it cannot be used."""
+
+    map_id: str
+
+    def run(self, site: Site) -> str | None:
+        """Do it."""
+        try:
+            site.prepare_map(self.map_id)
+        except FirstfixError as error:
+            return f"The map {self.map_id} cannot be used: {error}"
+        return site.faults.get(self.map_id)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Look:
+    """Take a first look at maps."""
+
+    query: SiteQuery
+    map_ids: tuple[str, ...]
+
+    def run(self, site: Site) -> Looked:
+        """Do it."""
+        return site.first_look(self.query, self.map_ids)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Search:
+    """Search maps."""
+
+    query: SiteQuery
+    map_ids: tuple[str, ...]
+
+    def run(self, site: Site) -> SiteCandidates:
+        """Do it."""
+        return site.search(self.query, self.map_ids)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Done(Generic[T]):
+    """The result of a job, and the memory of its worker.
+
+    Parameters
+    ----------
+    result : object
+        What the job returned.
+    memory : int
+        Memory that the process of the worker uses, bytes; 0 where the system does not say.
+    """
+
+    result: T
+    memory: int
+
+
+@dataclass(frozen=True, eq=False)
+class ShardedSite:
+    """A site whose maps are spread over workers.
+
+    Parameters
+    ----------
+    path : Path
+        The site, at the same path for all workers.
+    shards : tuple of tuple of str
+        Ids of the maps of each worker.
+    cache_dir : Path
+        Folder of prepared maps.
+    memory_limit : int
+        Size of the prepared maps that each worker holds, bytes.
+    """
+
+    path: Path
+    shards: tuple[tuple[str, ...], ...]
+    cache_dir: Path
+    memory_limit: int
+
+    def open(self, worker: int) -> Site:
+        """Open the part of a worker."""
+        described = read_site(self.path)
+        mine = set(self.shards[worker])
+        maps = tuple(entry for entry in described.maps if entry.id in mine)
+        return Site(type(described)(maps), self.cache_dir, self.memory_limit)
+
+
+def spread(maps: Sequence[SiteMap], workers: int) -> tuple[tuple[str, ...], ...]:
+    """Spread maps over workers, so that each gets about the same size of images.
+
+    Parameters
+    ----------
+    maps : sequence of SiteMap
+        The maps.
+    workers : int
+        At least 1; no more are used than there are maps.
+
+    Returns
+    -------
+    tuple of tuple of str
+        Ids of the maps of each worker.
+    """
+    sizes = {entry.id: _size(entry) for entry in maps}
+    shards: list[list[str]] = [[] for _ in range(max(1, min(workers, len(maps))))]
+    filled = [0] * len(shards)
+    for map_id in sorted(sizes, key=lambda name: (-sizes[name], name)):
+        least = filled.index(min(filled))
+        shards[least].append(map_id)
+        filled[least] += sizes[map_id]
+    return tuple(tuple(shard) for shard in shards)
+
+
+def _size(entry: SiteMap) -> int:
+    """Return the size of the largest image beside a map, as a measure of the work that it takes."""
+    from firstfix.io.maps.map_yaml import read_yaml
+
+    try:
+        return read_yaml(entry.path).image.stat().st_size + 1
+    except (FirstfixError, OSError):
+        return 1  # a broken map is named when it is prepared
+
+
+def run_job(job: Job[T], site: Site) -> Done[T]:
+    """Do a job in this process."""
+    return Done(job.run(site), memory_of_this_process())
+
+
+def memory_of_this_process() -> int:
+    """Return the resident memory, bytes; 0 where the system does not say."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0
+    return pages * os.sysconf("SC_PAGE_SIZE")

@@ -1,0 +1,234 @@
+"""``firstfix fleet serve`` over HTTP, with its processes of this machine."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fleet_lab import FleetServer, as_message, scan_of
+from prometheus_client.parser import text_string_to_metric_families
+
+from firstfix.core.se2 import SE2
+from firstfix.site.site import Site
+
+POSE = SE2(3.9, 1.7, 0.6)
+
+
+@pytest.fixture(scope="module")
+def server(serve: Callable[..., FleetServer], rooms: Path) -> FleetServer:
+    return serve(rooms, "--workers", "2", "--max-robots", "3").wait_until_ready()
+
+
+def ask(server: FleetServer, **body: Any) -> dict[str, Any]:
+    response = server.http.post("/v1/locate", json=body)
+    assert response.status_code == 200, response.text
+    return response.json()
+
+
+def test_locate_gives_the_answer_of_the_site(server: FleetServer, rooms: Path) -> None:
+    scan = scan_of("second", POSE)
+    answer = ask(server, scans=[as_message(scan)])
+    alone = Site.load(rooms).locate(scan).to_dict()
+    assert (answer["verdict"], answer["map_id"]) == ("UNIQUE", "second")
+    assert answer["pose"] == pytest.approx(list(POSE), abs=0.05)
+    assert answer["pose"] == pytest.approx(alone["pose"], abs=1e-6)
+    assert answer["searched"] == 4
+    assert answer["maps"] == pytest.approx(alone["maps"], abs=0.02)
+
+
+def test_a_bare_scan_and_a_file_are_the_same(server: FleetServer) -> None:
+    scan = scan_of("first", POSE)
+    message = as_message(scan)
+    packed = io.BytesIO()
+    np.savez(packed, **{k: np.asarray(v) for k, v in message.items()})
+    bare = server.http.post("/v1/locate", json=message).json()
+    file = server.http.post(
+        "/v1/locate",
+        content=packed.getvalue(),
+        headers={"content-type": "application/octet-stream"},
+    )
+    assert bare["map_id"] == "first"
+    assert file.json().get("pose") == pytest.approx(bare["pose"], abs=1e-3), file.text
+
+
+def test_copies_are_listed_and_the_broken_map_is_named(server: FleetServer) -> None:
+    answer = ask(server, scans=[as_message(scan_of("ground", POSE))])
+    also = [other["map_id"] for other in answer["hypotheses"][0]["also"]]
+    assert sorted([answer["map_id"], *also]) == ["copy", "ground"]
+    assert answer["verdict"] == "UNIQUE"
+    assert [fault[:14] for fault in answer["faults"]] == ["The map broken"]
+    states = {each["map_id"]: each for each in server.http.get("/v1/maps").json()["maps"]}
+    assert states["broken"]["fault"].startswith("The map broken cannot be used: ")
+    assert [name for name, state in states.items() if state["ready"]] == [
+        "copy",
+        "first",
+        "ground",
+        "second",
+    ]
+
+
+def test_only_the_named_map_is_searched(server: FleetServer) -> None:
+    message = as_message(scan_of("second", POSE))
+    answer = server.http.post("/v1/locate?map=second", json=message).json()
+    assert (answer["map_id"], answer["searched"]) == ("second", 1)
+    refused = server.http.post("/v1/locate?map=broken", json=message)
+    assert (refused.status_code, refused.json()["detail"][:14]) == (503, "The map broken")
+    unknown = server.http.post("/v1/locate", json={"scans": [message], "map": "attic"})
+    assert unknown.status_code == 404
+    assert unknown.json()["detail"].startswith("There is no map 'attic' in this site.")
+
+
+def test_a_prior_names_maps(server: FleetServer) -> None:
+    message = as_message(scan_of("second", POSE))
+    near = {"pose": list(POSE), "radius": 1.0}
+    answer = ask(server, scans=[message], prior={"second": near, "first": None})
+    assert answer["map_id"] == "second"
+    for prior, status in (({"attic": None}, 404), ({"second": {**near, "radius": -1.0}}, 422)):
+        refused = server.http.post("/v1/locate", json={"scans": [message], "prior": prior})
+        assert refused.status_code == status, refused.text
+
+
+def test_views_of_a_robot_are_judged_together(server: FleetServer) -> None:
+    # A sensor of 69 degrees sees too little from one pose.
+    poses = [SE2(2.3, 2.1, 0.2 + 0.5 * i) for i in range(4)]
+    views = []
+    for pose in poses:
+        message = as_message(scan_of("first", pose, beams=91, fov=1.2))
+        answer = server.http.post(
+            "/v1/robots/r1/scans", json={"scans": [message], "odometry": list(pose)}
+        ).json()
+        views.append((answer["views"], answer["verdict"]))
+    assert [count for count, _ in views] == [1, 2, 3, 4]
+    assert views[0][1] == "AMBIGUOUS"
+    assert (answer["map_id"], answer["verdict"]) == ("first", "UNIQUE")
+    assert server.http.get("/v1/robots/r1").json() == answer
+    assert "r1" in server.http.get("/v1/robots").json()["robots"]
+    assert server.http.delete("/v1/robots/r1").status_code == 204
+    for method in ("GET", "DELETE"):
+        gone = server.http.request(method, "/v1/robots/r1")
+        assert (gone.status_code, gone.json()["detail"][:10]) == (404, "This robot")
+
+
+def test_too_many_robots_are_refused_and_the_known_ones_are_served(server: FleetServer) -> None:
+    body = {"scans": [as_message(scan_of("first", POSE))], "odometry": [0.0, 0.0, 0.0]}
+    for name in ("a", "b", "c"):
+        assert server.http.post(f"/v1/robots/{name}/scans", json=body).status_code == 200
+    refused = server.http.post("/v1/robots/d/scans", json=body)
+    assert (refused.status_code, refused.headers["retry-after"]) == (429, "1")
+    assert server.http.post("/v1/robots/a/scans", json=body).status_code == 200
+    for name in ("a", "b", "c"):
+        server.http.delete(f"/v1/robots/{name}")
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        (b"", 400),
+        (b"\xff\xfe", 400),
+        (b"[" * 100_000, 422),
+        (b"[]", 422),
+        (b"{}", 422),
+        (b'{"scans": []}', 422),
+        (b'{"scans": [{"ranges": [1e999]}]}', 422),
+        (b'{"scans": [{}], "prior": 3}', 422),
+    ],
+)
+@pytest.mark.parametrize("path", ["/v1/locate", "/v1/robots/x/scans"])
+def test_bad_bodies_are_refused_in_a_sentence(
+    server: FleetServer, path: str, body: bytes, status: int
+) -> None:
+    response = server.http.post(path, content=body, headers={"content-type": "application/json"})
+    assert response.headers["content-type"] == "application/problem+json"
+    assert response.status_code == status
+    assert response.json()["detail"].endswith(".")
+    assert server.http.get("/v1/robots/x").status_code == 404
+
+
+def test_other_hostile_requests_are_refused(server: FleetServer) -> None:
+    message = as_message(scan_of("first", POSE))
+    jump = {"scans": [message, message], "odometry": [[0, 0, 0], [1000, 0, 0]]}
+    assert server.http.post("/v1/locate", json=jump).status_code == 422
+    short = {"scans": [message, message], "odometry": [[0, 0, 0]]}
+    assert server.http.post("/v1/locate", json=short).status_code == 422
+    many = {"scans": [message] * 17}
+    assert server.http.post("/v1/locate", json=many).status_code == 422
+    huge = server.http.post(
+        "/v1/locate", content=b" " * (5 << 20), headers={"content-type": "application/json"}
+    )
+    assert huge.status_code == 413
+    assert server.http.post("/v1/locate", content=b"x").status_code == 415
+    assert server.http.get("/v1/locate").status_code == 405
+    assert server.http.get("/v1/robots/..%00").status_code in {404, 422}
+    assert server.http.get(f"/v1/robots/{'x' * 65}").status_code == 422
+    not_a_file = server.http.post(
+        "/v1/locate", content=b"PK\3\4", headers={"content-type": "application/octet-stream"}
+    )
+    assert not_a_file.status_code == 422
+
+
+def test_many_robots_at_once_are_all_answered(server: FleetServer) -> None:
+    rooms = ["ground", "first", "second"] * 7
+    bodies = [{"scans": [as_message(scan_of(room, POSE, seed=i))]} for i, room in enumerate(rooms)]
+    with ThreadPoolExecutor(len(bodies)) as robots:
+        answers = list(robots.map(lambda body: ask(server, **body), bodies))
+    assert [answer["verdict"] for answer in answers] == ["UNIQUE"] * len(rooms)
+    found = [answer["map_id"].replace("copy", "ground") for answer in answers]
+    assert found == rooms
+
+
+def test_a_killed_worker_is_replaced_and_nothing_is_wrong(server: FleetServer) -> None:
+    body = {"scans": [as_message(scan_of("first", POSE))]}
+    before = server.workers()
+    assert len(before) == 2
+    with ThreadPoolExecutor(8) as robots:
+        asked = [robots.submit(server.http.post, "/v1/locate", json=body) for _ in range(24)]
+        time.sleep(0.05)
+        os.kill(before[0], signal.SIGKILL)
+        responses = [each.result() for each in asked]
+    for response in responses:
+        assert response.status_code in {200, 503}
+        if response.status_code == 200:
+            assert response.json()["map_id"] == "first"
+        else:
+            assert "retry-after" in response.headers
+    answer = ask(server, **body)
+    assert (answer["verdict"], answer["map_id"]) == ("UNIQUE", "first")
+    assert set(server.workers()) & set(before) == {before[1]}
+
+
+def test_metrics(server: FleetServer) -> None:
+    ask(server, scans=[as_message(scan_of("first", POSE))])
+    text = server.http.get("/metrics").text
+    values = {
+        (sample.name, *sample.labels.values()): sample.value
+        for family in text_string_to_metric_families(text)
+        for sample in family.samples
+    }
+    assert values["firstfix_maps", "prepared"] == 4
+    assert values["firstfix_maps", "unusable"] == 1
+    assert values["firstfix_verdicts_total", "UNIQUE"] >= 1
+    assert values["firstfix_requests_total", "locate", "200"] >= 1
+    assert values["firstfix_latency_seconds_count", "locate"] >= 1
+    assert values["firstfix_queue",] == 0
+    assert values["process_resident_memory_bytes",] > 1e7
+    assert values["firstfix_worker_memory_bytes", "0"] > 1e7
+
+
+def test_the_end_leaves_no_process(serve: Callable[..., FleetServer], rooms: Path) -> None:
+    server = serve(rooms, "--workers", "1")
+    server.wait_until_ready()
+    workers = server.workers()
+    assert workers
+    assert server.stop() == 0
+    deadline = time.monotonic() + 10.0
+    while any(Path(f"/proc/{pid}").exists() for pid in workers):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
