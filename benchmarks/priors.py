@@ -17,9 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from firstfix.belief.prior import Near
-from firstfix.core.estimate import LocateResult, Verdict
 from firstfix.core.errors import InputError
+from firstfix.core.estimate import LocateResult, Verdict
 from firstfix.core.grid import OccupancyGrid
+from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.places import is_same_place
 from firstfix.global_localization.scan_matcher import ScanMatcher
@@ -81,12 +82,16 @@ def outcomes(
     if rival:
         priors["look-alike"] = Near(rival[0], WRONG_M)
     found = [("none", outcome(alone, truth))]
-    for kind, prior in priors.items():
-        try:
-            found.append((kind, outcome(matcher.locate(scan, prior=prior), truth)))
-        except InputError:
-            continue  # a right prior whose centre is outside the map
-    return found
+    located = {kind: locate(matcher, scan, prior) for kind, prior in priors.items()}
+    return found + [(kind, outcome(result, truth)) for kind, result in located.items() if result]
+
+
+def locate(matcher: ScanMatcher, scan: LaserScan, prior: Near) -> LocateResult | None:
+    """Return the answer; None for a prior whose centre is outside the map."""
+    try:
+        return matcher.locate(scan, prior=prior)
+    except InputError:
+        return None
 
 
 def outcome(result: LocateResult, truth: SE2) -> str:

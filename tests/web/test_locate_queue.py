@@ -122,6 +122,47 @@ def test_a_malformed_scan_is_refused_in_one_sentence(api, scan, wrong):
     assert len(answer.json()["detail"]) < 500
 
 
+def test_several_scans_with_odometry_and_a_prior_are_located_together(api, site, scan):
+    x, y, _ = site.store.snapshot.pose
+    second = as_json(scan) | {"stamp": 0.1, "sensor": "rear", "T_base_laser": [0.0, 0.0, 0.0]}
+    body = {
+        "scans": [as_json(scan) | {"sensor": "front"}, second],
+        "T_odom_base": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
+        "prior": {"near": [[x, y, 0.0]], "radius": 3.0},
+        "map": "house",
+    }
+    answer = api.post("/v1/locate", json=body).json()
+    assert answer["verdict"] == "UNIQUE"
+    assert answer["probability_without_prior"] > 0.9
+    np.testing.assert_allclose(answer["pose"][:2], [x, y], atol=0.1)
+    assert api.post("/v1/locate", json=body | {"map": "cellar"}).status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"scans": []}, "scans"),
+        ({"scans": {}}, "scans"),
+        ({"T_odom_base": []}, "one pose for each scan"),
+        ({"T_odom_base": [[9.0, 0.0, 0.0]]}, None),
+        ({"prior": {"near": [[1e5, 0.0, 0.0]]}}, "outside"),
+        ({"prior": {"near": [[0.0, 0.0]]}}, "near"),
+        ({"prior": {"radius": -1.0}}, "radius"),
+        ({"prior": {"region": [[0.0, 0.0], [1.0, 1.0]]}}, "three corners"),
+        ({"prior": {"zone": "hall"}}, "zone"),
+        ({"prior": {"fix": {"pose": [1, 1, 0], "covariance": [[-1, 0, 0]] * 3}}}, "covariance"),
+        ({"scan": []}, "scan"),
+    ],
+)
+def test_a_malformed_query_is_refused_in_one_sentence(api, scan, wrong, words):
+    answer = api.post("/v1/locate", json={"scans": [as_json(scan)]} | wrong)
+    if words is None:
+        assert answer.status_code == 200  # the frame of the odometry does not matter
+        return
+    assert answer.status_code == 422, answer.text
+    assert words in answer.json()["detail"]
+
+
 @pytest.mark.parametrize("missing", ["ranges", *NAMES])
 def test_each_field_is_required(api, scan, missing):
     body = as_json(scan)
@@ -189,10 +230,10 @@ def test_a_few_requests_wait_and_the_rest_get_503(api, site, scan, monkeypatch):
     matcher = site.store.snapshot.map.matcher
     right = type(matcher).locate
 
-    def slow(self, scan):
+    def slow(self, scans, odometry, prior):
         begun.set()
         assert go.wait(60)
-        return right(self, scan)
+        return right(self, scans, odometry, prior)
 
     monkeypatch.setattr(type(matcher), "locate", slow)
     with concurrent.futures.ThreadPoolExecutor(10) as pool:
@@ -213,10 +254,10 @@ def test_a_few_requests_wait_and_the_rest_get_503(api, site, scan, monkeypatch):
 
 def test_many_poses_of_a_house_are_found_through_the_api(api, site):
     grid = site.store.snapshot.map.grid
-    lidar = next(iter(SENSORS.values()))
+    (lidar,) = next(iter(SENSORS.values())).lidars
     rng = np.random.default_rng(0)
     for pose in random_free_poses(grid, rng, 5, 0.5):
-        scan = lidar.scan(grid, pose @ lidar.T_base_laser, rng)
+        scan = lidar.scan(grid, pose, rng)
         answer = api.post("/v1/locate", json=as_json(scan)).json()
         assert answer["verdict"] in {"UNIQUE", "AMBIGUOUS"}
         if answer["verdict"] == "UNIQUE":

@@ -67,6 +67,7 @@ class Localizer:
         self._cache_dir = cache_dir
         self._rng = np.random.default_rng(self.config.amcl.seed)
         self._scans = ScanQueue(self.config.scans)
+        self._view: View | None = None
         self._lifted: set[SignalKind] = set()
         self._update_requested = False
         self._hint: Hint | None = None
@@ -95,6 +96,11 @@ class Localizer:
     def belief(self) -> Belief | None:
         """The belief over all places of the map; None before the first map."""
         return None if self._state is State.NO_MAP else self._places.belief
+
+    @property
+    def view(self) -> View | None:
+        """The scans that were used last, moved to one time; None before the first."""
+        return self._view
 
     @property
     def matcher(self) -> ScanMatcher | None:
@@ -246,6 +252,7 @@ class Localizer:
             return [self._status(view.stamp, "a scan is older than all odometry: left out")]
         if self._state is State.LIFTED or not self._scans.is_valid(view):
             return []
+        self._view = view
         steps = {
             State.SEARCHING: self._find,
             State.DISAMBIGUATING: self._find,

@@ -18,6 +18,9 @@ VERSION = 1
 SCAN, PARTICLES, BELIEF = 1, 2, 3
 NO_RETURN = 4
 
+# The number of a sensor has four bits.
+_MOST_SENSORS = 16
+
 # The heat map: cells of about this size, m, and so many of them a side at most.
 _HEAT_M = 0.5
 _MOST_HEAT_CELLS = 256
@@ -27,27 +30,32 @@ _HEAT_HEADER = struct.Struct("<HHf")
 
 
 def scan_frame(registered: RegisteredScan | None, active_map: ActiveMap | None) -> bytes:
-    """Encode a scan in the map frame, with the class of each beam.
+    """Encode the scans of all sensors in the map frame, with the class of each beam.
 
     Parameters
     ----------
     registered : RegisteredScan or None
-        The scan and the pose at which it is drawn; None for no scan.
+        The scans and the pose at which they are drawn; None for no scan.
     active_map : ActiveMap or None
         The map.
 
     Returns
     -------
     bytes
-        Binary message of kind 1. A beam without a return ends at `range_max`.
+        Binary message of kind 1. A beam without a return ends at `range_max`. The upper four bits
+        of its class are the number of its sensor.
     """
     if registered is None or active_map is None:
         return _HEADER.pack(SCAN, VERSION, 0, 0, 0.0)
-    scan = registered.scan
-    beams = classify_beams([scan], registered.T_map_base, active_map.matcher.fields)
-    classes = np.where(beams.hit, beams.classes, np.uint8(NO_RETURN))
-    header = _HEADER.pack(SCAN, VERSION, 0, len(classes), scan.stamp)
-    return header + beams.ends.astype("<f4").tobytes() + classes.tobytes()
+    ends, classes = [], []
+    for i, scan in enumerate(registered.scans[:_MOST_SENSORS]):
+        beams = classify_beams([scan], registered.T_map_base, active_map.matcher.fields)
+        ends.append(beams.ends.astype("<f4").tobytes())
+        classes.append(np.where(beams.hit, beams.classes, np.uint8(NO_RETURN)) | np.uint8(i << 4))
+    all_classes = np.concatenate(classes)
+    stamp = max(scan.stamp for scan in registered.scans)
+    header = _HEADER.pack(SCAN, VERSION, 0, len(all_classes), stamp)
+    return header + b"".join(ends) + all_classes.tobytes()
 
 
 def particles_frame(cloud: ParticleCloud | None, pose: SE2 | None, stamp: float) -> bytes:

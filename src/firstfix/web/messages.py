@@ -219,6 +219,9 @@ class Answer(Struct, frozen=True):
     pose: Pose | None
     covariance: tuple[Row, Row, Row] | None
     hypotheses: list[LocatedPlace]
+    probability_without_prior: Annotated[
+        Share | None, Meta(description="of the best place, by the scans alone")
+    ]
     search: SearchReport
     elapsed_s: float
     error: None

@@ -9,7 +9,7 @@ import msgspec
 from firstfix import __version__
 from firstfix.web.commands import Pose
 from firstfix.web.dropped_files import MOST_FILES
-from firstfix.web.locate_queue import Scan
+from firstfix.web.locate_request import Query, Scan
 from firstfix.web.map_changes import Changes
 from firstfix.web.map_png import LEAST_PIXELS, MOST_PIXELS
 from firstfix.web.messages import Accepted, Answer, LocatedFiles, Map, Status
@@ -18,7 +18,7 @@ from firstfix.web.request_body import JSON, NPZ
 
 Schema = dict[str, Any]
 
-_STRUCTS = (Pose, Scan, Accepted, Answer, LocatedFiles, Map, Changes, Status, Problem)
+_STRUCTS = (Pose, Query, Scan, Accepted, Answer, LocatedFiles, Map, Changes, Status, Problem)
 # Refusals of requests with a body.
 _BODY = (400, 408, 413, 415, 422)
 
@@ -49,7 +49,7 @@ def document() -> Schema:
 
 def _paths() -> Schema:
     scan_body = {
-        JSON: {"schema": _ref(Scan)},
+        JSON: {"schema": {"anyOf": [_ref(Scan), _ref(Query)]}},
         NPZ: {"schema": {"description": "an .npz file with the arrays of Scan"}},
     }
     pixels = _query("max", f"longer side, pixels; larger values mean {MOST_PIXELS}")
@@ -78,7 +78,7 @@ def _paths() -> Schema:
             | {"parameters": [pixels]}
         },
         "/v1/locate": {
-            "post": _operation("Search one scan in the map", _json(Answer), *_BODY, 404, 503)
+            "post": _operation("Search scans in the map", _json(Answer), *_BODY, 404, 503)
             | {"parameters": [map_name], "requestBody": {"required": True, "content": scan_body}}
         },
         "/v1/locate-files": {

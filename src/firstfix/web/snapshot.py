@@ -47,10 +47,15 @@ class ActiveMap:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RegisteredScan:
-    """A scan and the pose at which it is drawn."""
+    """The scan of each sensor, and the pose of the robot at which they are drawn."""
 
-    scan: LaserScan
+    scans: tuple[LaserScan, ...]
     T_map_base: SE2
+
+    @property
+    def scan(self) -> LaserScan:
+        """The scan of the first sensor."""
+        return self.scans[0]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

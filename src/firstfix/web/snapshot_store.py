@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -26,9 +25,6 @@ from firstfix.web.snapshot import (
 from firstfix.web.timeline import Event, Timeline
 from firstfix.web.timing import TimingStatistics
 
-# Scans kept until the localizer has used them: they wait for odometry.
-_MOST_SCANS = 40
-
 
 class SnapshotStore:
     """Observer of a node: holds the newest snapshot and the timeline.
@@ -47,7 +43,6 @@ class SnapshotStore:
         self.set_map_name(map_name)
         self._timeline = Timeline()
         self._timing = TimingStatistics()
-        self._scans: deque[LaserScan] = deque(maxlen=_MOST_SCANS)
         self._listeners: list[Callable[[], None]] = []
 
     @property
@@ -104,7 +99,6 @@ class SnapshotStore:
         self._timing.end_input(given, outputs, self._snapshot.state)
         with self._lock:
             if isinstance(given, LaserScan):
-                self._scans.append(given)
                 self._snapshot = replace(self._snapshot, stamp=given.stamp)
             self._timeline.add_input(given)
             if isinstance(given, NewMap):
@@ -118,7 +112,6 @@ class SnapshotStore:
         self._timing.start_input()
 
     def _store_map(self, given: NewMap, localizer: Localizer) -> None:
-        self._scans.clear()
         if localizer.matcher is not None:
             key = map_key(given.grid)
             active_map = ActiveMap(
@@ -135,10 +128,10 @@ class SnapshotStore:
                 hypotheses=(),
                 motion=None,
                 particles=self._cloud(localizer, output.T_map_base),
-                scan=self._registered(output.stamp, output.T_map_base),
+                scan=self._registered(localizer, output.T_map_base),
             )
         elif isinstance(output, Hypotheses):
-            scan = self._registered(output.stamp, output.places[0].pose)
+            scan = self._registered(localizer, output.places[0].pose)
             self._snapshot = replace(
                 self._snapshot, hypotheses=output.places, motion=None, scan=scan
             )
@@ -174,9 +167,9 @@ class SnapshotStore:
             return before
         return ParticleCloud(particles, T_map_base)
 
-    def _registered(self, stamp: float, T_map_base: SE2) -> RegisteredScan | None:
-        scan = next((scan for scan in reversed(self._scans) if scan.stamp == stamp), None)
-        return RegisteredScan(scan, T_map_base) if scan is not None else self._snapshot.scan
+    def _registered(self, localizer: Localizer, T_map_base: SE2) -> RegisteredScan | None:
+        view = localizer.view
+        return self._snapshot.scan if view is None else RegisteredScan(view.scans, T_map_base)
 
     def _notify(self) -> None:
         for changed in tuple(self._listeners):

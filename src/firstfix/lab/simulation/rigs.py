@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -54,7 +55,13 @@ class Rig:
         self, grid: OccupancyGrid, T_map_base: SE2, rng: np.random.Generator, stamp: float = 0.0
     ) -> tuple[LaserScan, ...]:
         """Take one scan of each sensor of a robot at rest; arguments as of `Lidar.scan`."""
-        return tuple(lidar.scan(grid, T_map_base, rng, stamp) for lidar in self.lidars)
+        return self.named(lidar.scan(grid, T_map_base, rng, stamp) for lidar in self.lidars)
+
+    def named(self, scans: Iterable[LaserScan]) -> tuple[LaserScan, ...]:
+        """Give the scans of several sensors, in their order, the names of the sensors."""
+        if len(self.lidars) == 1:
+            return tuple(scans)
+        return tuple(replace(scan, sensor=f"sensor {i + 1}") for i, scan in enumerate(scans))
 
 
 _USUAL = Lidar(dropout=0.01, T_base_laser=SE2(0.07, 0.0, 0.0))

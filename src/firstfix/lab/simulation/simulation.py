@@ -158,7 +158,7 @@ class Simulation:
     ) -> list[LaserScan]:
         """Take one scan of each sensor, begun at a pose and ended at the present one."""
         rolling = self.rig.shutter is Shutter.ROLLING
-        scans = [
+        scans = self.rig.named(
             sweep(
                 lidar,
                 self.floor,
@@ -169,9 +169,9 @@ class Simulation:
                 T_map_base_after=self.robot.T_map_base if rolling else None,
             )
             for lidar in self.rig.lidars
-        ]
+        )
         if not rolling:
-            return scans
+            return [*scans]
         return [
             replace(scan, time_increment=PERIOD_S * lidar.angle_increment / FULL_TURN)
             for scan, lidar in zip(scans, self.rig.lidars, strict=True)

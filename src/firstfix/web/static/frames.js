@@ -12,7 +12,7 @@ const HEAT_HEADER_BYTES = 8;
  *
  * @param {ArrayBuffer} buffer
  * @returns {?{kind: "scan"|"particles"|"belief", stamp: number, count: number,
- *     values: Float32Array, classes: ?Uint8Array}} null if its kind is unknown
+ *     values: Float32Array, classes: ?Uint8Array, sensors: ?Uint8Array}} null if its kind is unknown
  */
 export function readFrame(buffer) {
   if (buffer.byteLength < HEADER_BYTES) return null;
@@ -23,8 +23,10 @@ export function readFrame(buffer) {
   const stamp = header.getFloat64(8, true);
   if (kind === SCAN && buffer.byteLength === HEADER_BYTES + 9 * count) {
     const values = new Float32Array(buffer, HEADER_BYTES, 2 * count);
-    const classes = new Uint8Array(buffer, HEADER_BYTES + 8 * count, count);
-    return { kind: "scan", stamp, count, values, classes };
+    const bytes = new Uint8Array(buffer, HEADER_BYTES + 8 * count, count);
+    const classes = bytes.map((byte) => byte & 15);
+    const sensors = bytes.map((byte) => byte >> 4);
+    return { kind: "scan", stamp, count, values, classes, sensors };
   }
   if (kind === PARTICLES && buffer.byteLength === HEADER_BYTES + 12 * count) {
     const values = new Float32Array(buffer, HEADER_BYTES, 3 * count);

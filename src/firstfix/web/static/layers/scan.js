@@ -27,19 +27,25 @@ export function drawScan(ctx, view, scan, colours) {
   }
 }
 
-/** The area that the sensor sees, as one faint shape around the robot. */
+/** The areas that the sensors see, each as one faint shape around the robot in its own shade. */
 export function drawFieldOfView(ctx, view, scan, pose, colours) {
-  const { values, count } = scan;
+  const { values, count, sensors } = scan;
   if (count < 3) return;
-  ctx.beginPath();
-  ctx.moveTo(...view.toScreen(pose[0], pose[1]));
-  for (let i = 0; i < count; i++) {
-    ctx.lineTo(...view.toScreen(values[2 * i], values[2 * i + 1]));
+  let start = 0;
+  while (start < count) {
+    const sensor = sensors ? sensors[start] : 0;
+    let end = start;
+    ctx.beginPath();
+    ctx.moveTo(...view.toScreen(pose[0], pose[1]));
+    for (; end < count && (!sensors || sensors[end] === sensor); end++) {
+      ctx.lineTo(...view.toScreen(values[2 * end], values[2 * end + 1]));
+    }
+    ctx.closePath();
+    ctx.fillStyle = sensor % 2 === 0 ? colours.robot : colours.short;
+    ctx.globalAlpha = 0.07;
+    ctx.fill();
+    start = end;
   }
-  ctx.closePath();
-  ctx.fillStyle = colours.robot;
-  ctx.globalAlpha = 0.07;
-  ctx.fill();
   ctx.globalAlpha = 1;
 }
 
