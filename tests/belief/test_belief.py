@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from firstfix.belief.belief import begin, brings_news, predict, update
+from firstfix.belief.belief import begin, brings_news, predict, update, with_prior
 from firstfix.belief.config import BeliefConfig
+from firstfix.belief.hints import Source
 from firstfix.belief.prior import Near
 from firstfix.belief.view import View
 from firstfix.core.angles import angle_error
@@ -258,8 +259,27 @@ def test_a_blind_view_changes_nothing_but_the_prediction(halls, drive):
 def test_a_hint_decides_between_places_that_look_the_same(four_rooms, drive):
     start = SE2(*four_rooms.grid.to_map(np.array([60.0, 60.0])).tolist(), 0.5)
     (view,) = drive(four_rooms.grid, start, [], WIDE)
+    near = Near(start @ SE2(0.3, 0.3, 0.2), 1.0)
+    belief = update(with_prior(begin(four_rooms), near, None, Source.PERSON), view)
+    assert is_at(belief.places[0].pose, start)
+    assert belief.verdict is Verdict.UNIQUE
+
+
+def test_the_prior_of_a_program_decides_nothing_by_itself(four_rooms, drive):
+    """It lists the place first; where another looks the same, it may be wrong."""
+    start = SE2(*four_rooms.grid.to_map(np.array([60.0, 60.0])).tolist(), 0.5)
+    (view,) = drive(four_rooms.grid, start, [], WIDE)
     belief = update(begin(four_rooms, Near(start @ SE2(0.3, 0.3, 0.2), 1.0)), view)
     assert is_at(belief.places[0].pose, start)
+    assert belief.places[0].probability > 0.95
+    assert belief.verdict is Verdict.AMBIGUOUS
+    assert "the prior chooses this place" in belief.reason
+
+
+def test_the_prior_of_a_program_confirms_what_the_view_finds_likely(room, drive):
+    start = SE2(5.0, 2.5, 0.4)
+    (view,) = drive(room.grid, start, [], WIDE)
+    belief = update(begin(room, Near(start, 1.0)), view)
     assert belief.verdict is Verdict.UNIQUE
 
 

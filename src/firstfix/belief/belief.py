@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from firstfix.belief.config import BeliefConfig
 from firstfix.belief.enter import propose
 from firstfix.belief.evidence import WRONG_MAP_COST, shares
-from firstfix.belief.hints import Hint, hint_logs
+from firstfix.belief.hints import Hint, Source, hint_logs
 from firstfix.belief.joint import joint_log_likelihoods, power_of
 from firstfix.belief.judge import Judgement, Rule, judge
 from firstfix.belief.merge import merge
@@ -175,7 +175,9 @@ def begin(
     return belief if prior is None else with_prior(belief, prior, None)
 
 
-def with_prior(belief: Belief, prior: Prior, T_odom_base: SE2 | None) -> Belief:
+def with_prior(
+    belief: Belief, prior: Prior, T_odom_base: SE2 | None, source: Source = Source.MEASURED
+) -> Belief:
     """Add a prior, such as a person's hint; it counts from the next view on.
 
     Parameters
@@ -186,6 +188,8 @@ def with_prior(belief: Belief, prior: Prior, T_odom_base: SE2 | None) -> Belief:
         Of the pose of the base in the map.
     T_odom_base : SE2 or None
         Odometry at the time for which it holds; None for that of the next view.
+    source : Source
+        Who gives it.
 
     Returns
     -------
@@ -199,7 +203,7 @@ def with_prior(belief: Belief, prior: Prior, T_odom_base: SE2 | None) -> Belief:
     """
     prior.check(belief.fields.grid)
     anchor = None if T_odom_base is None else in_cells(T_odom_base, belief.fields.grid.resolution)
-    return replace(belief, hints=(*belief.hints, Hint(prior, anchor)))
+    return replace(belief, hints=(*belief.hints, Hint(prior, anchor, source)))
 
 
 def brings_news(belief: Belief, T_odom_base: SE2) -> bool:
@@ -261,7 +265,11 @@ def update(belief: Belief, view: View) -> Belief:
     probabilities, _ = shares(logs, power_of(window))
     kept = probabilities >= NEGLIGIBLE
     tracks, probabilities = tracks.take(kept), probabilities[kept]
-    rule = Rule(config.sure_probability, hinted=_is_hinted(tracks, window, belief))
+    rule = Rule(
+        config.sure_probability,
+        hinted=_is_hinted(tracks, window, belief),
+        evidence=_share_without_priors(tracks, probabilities, window, belief),
+    )
     judgement = judge(
         tracks.costs, tracks.ids, probabilities, window, belief.judgement.favourite, rule
     )
@@ -284,7 +292,7 @@ def _anchored(belief: Belief) -> Belief:
     return replace(
         belief,
         hints=tuple(
-            Hint(hint.prior, now) if hint.odometry is None else hint for hint in belief.hints
+            replace(hint, odometry=now) if hint.odometry is None else hint for hint in belief.hints
         ),
     )
 
@@ -352,6 +360,24 @@ def _is_hinted(tracks: Tracks, window: tuple[Observation, ...], belief: Belief) 
         return False
     logs = hint_logs(tracks.now[:1], window[-1], belief.hints, belief.fields.grid)
     return bool(logs[0] >= -1.0)
+
+
+def _share_without_priors(
+    tracks: Tracks,
+    probabilities: NDArray[np.float64],
+    window: tuple[Observation, ...],
+    belief: Belief,
+) -> float:
+    """Return the probability of the best place with the priors of programs left out."""
+    measured = [hint for hint in belief.hints if hint.source is Source.MEASURED]
+    if not measured or len(tracks) == 0:
+        return 1.0
+    logs = hint_logs(tracks.now, window[-1], measured, belief.fields.grid)
+    if not logs.any():
+        return 1.0
+    weights = probabilities * np.exp(-logs)
+    elsewhere = max(0.0, 1.0 - float(probabilities.sum()))
+    return float(weights[0] / (weights.sum() + elsewhere))
 
 
 def _missed(judgement: Judgement, tracks: Tracks, entering: Tracks) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,13 @@ from firstfix.global_localization.prior import Prior
 _FADES_M = 10.0
 
 
+class Source(Enum):
+    """Who gives a prior."""
+
+    PERSON = "a person, who may choose among places that look alike"
+    MEASURED = "a program, which may be wrong without anybody noticing"
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Hint:
     """A prior, and where odometry was when it held.
@@ -27,10 +35,13 @@ class Hint:
         Of the pose of the base in the map.
     odometry : ndarray, shape (3,), or None
         Pose of the base in the odometry frame, cells and rad; None until the first view.
+    source : Source
+        Who gave it.
     """
 
     prior: Prior
     odometry: NDArray[np.float64] | None
+    source: Source = Source.MEASURED
 
 
 def hint_logs(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from firstfix.belief.view import Observation, motion
 from firstfix.core.estimate import Verdict
+from firstfix.global_localization.prior import SHARE_OF_SMALL_VIEW, SHARE_WITHOUT_PRIOR
 from firstfix.global_localization.verdict import RIVAL_SHARE, place_probabilities
 
 # Mean cost of a beam up to which a view is explained at a place. The wrong map begins at 2.3.
@@ -78,10 +79,13 @@ class Rule:
         Least probability.
     hinted : bool
         True if a prior speaks for the best place: then one view is enough.
+    evidence : float
+        Probability of the best place with the priors of programs left out; 1 without such a prior.
     """
 
     probability: float
     hinted: bool
+    evidence: float = 1.0
 
 
 def judge(
@@ -133,11 +137,15 @@ def judge(
     if not (stays or first) and probabilities[0] < rule.probability:
         return Judgement(Verdict.AMBIGUOUS, _undecided(probabilities, len(window)), None)
 
-    published = alone or rule.hinted or (known is not None and _confirmed(known, seen))
+    if not stays and rule.evidence < SHARE_WITHOUT_PRIOR:
+        return Judgement(Verdict.AMBIGUOUS, _chosen_by_prior(probabilities, rule), None)
+    one_view = SHARE_WITHOUT_PRIOR if seen.decides_alone else SHARE_OF_SMALL_VIEW
+    hinted = rule.hinted and rule.evidence >= one_view
+    published = alone or hinted or (known is not None and _confirmed(known, seen))
     since = seen if known is None else known.since
     favourite = Favourite(int(ids[0]), since, published)
     if published:
-        return Judgement(Verdict.UNIQUE, _sure(len(window), rule), favourite)
+        return Judgement(Verdict.UNIQUE, _sure(len(window), hinted=hinted), favourite)
     reason = (
         f"one place has {probabilities[0]:.0%} of the probability, but this sensor needs a second "
         f"view to be sure: drive {SECOND_LOOK_M} m or turn {math.degrees(SECOND_LOOK_RAD):.0f}°"
@@ -156,8 +164,15 @@ def _confirmed(known: Favourite, seen: Observation) -> bool:
     return known.published or far or turn >= SECOND_LOOK_RAD
 
 
-def _sure(views: int, rule: Rule) -> str:
-    if rule.hinted:
+def _chosen_by_prior(probabilities: NDArray[np.float64], rule: Rule) -> str:
+    return (
+        f"the prior chooses this place ({probabilities[0]:.0%} likely with it, {rule.evidence:.0%} "
+        "by the views alone); motion may confirm it"
+    )
+
+
+def _sure(views: int, *, hinted: bool) -> str:
+    if hinted:
         return "the scan confirms the place that was given, and nowhere else fits nearly as well"
     which = "the scan fits" if views == 1 else f"the latest {views} views fit"
     return f"{which} here and nowhere else nearly as well"

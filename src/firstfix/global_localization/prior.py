@@ -16,6 +16,12 @@ from firstfix.global_localization.verify import Verification
 
 # With a prior the search lists more places, so that some are near it.
 DEEPER = 20
+# A prior may be wrong, and then a place that looks like the true one lies near it. It is followed
+# only to a place that the scans alone find twice as likely as all others together; to one that a
+# single scan of a sensor with a small view finds almost certain, because such scans err.
+SHARE_WITHOUT_PRIOR = 2.0 / 3.0
+SHARE_OF_SMALL_VIEW = 0.98
+
 # Log-likelihood down to which a place is near a prior.
 NEAR_LOG = -1.0
 

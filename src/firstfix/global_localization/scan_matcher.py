@@ -21,7 +21,12 @@ from firstfix.global_localization.beams import FEWEST_HITS
 from firstfix.global_localization.config import LocateConfig, Method
 from firstfix.global_localization.exhaustive import BASIC, FAST, ExhaustiveSearch
 from firstfix.global_localization.places import distinct_places
-from firstfix.global_localization.prior import PlacePrior, Prior
+from firstfix.global_localization.prior import (
+    SHARE_OF_SMALL_VIEW,
+    SHARE_WITHOUT_PRIOR,
+    PlacePrior,
+    Prior,
+)
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.scoring import score_poses, search_locally
 from firstfix.global_localization.search import search
@@ -284,7 +289,9 @@ def locate(
         by_scan = distinct_places(poses, verification.scores, resolution, config.hypotheses)
         alone = place_probabilities(verification.scores[by_scan], len(beams))
         logs = log_likelihoods(verification.scores[[ranked[0], by_scan[0]]], len(beams))
-        result = _with_share_of_prior(result, float(alone[0]), float(np.exp(logs[0] - logs[1])))
+        needed = SHARE_WITHOUT_PRIOR if see_enough(scans) else SHARE_OF_SMALL_VIEW
+        ratio = float(np.exp(logs[0] - logs[1]))
+        result = _with_share_of_prior(result, float(alone[0]), ratio, needed)
     return replace(result, elapsed_s=time.perf_counter() - started)
 
 
@@ -293,11 +300,13 @@ def _united(rankings: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
     return rankings[0] if len(rankings) == 1 else np.unique(np.concatenate(rankings))
 
 
-def _with_share_of_prior(result: LocateResult, favourite: float, ratio: float) -> LocateResult:
-    """State how likely the best place is by the scan alone; where they disagree, neither decides.
+def _with_share_of_prior(
+    result: LocateResult, favourite: float, ratio: float, needed: float
+) -> LocateResult:
+    """State how likely the best place is by the scan alone; a prior decides nothing by itself.
 
-    A prior chooses among places that the scan cannot tell apart. One that needs a place that fits
-    clearly worse than another may be wrong.
+    A prior chooses among places that the scan cannot tell apart. If it is wrong, it chooses a place
+    that looks like the true one.
 
     Parameters
     ----------
@@ -307,13 +316,20 @@ def _with_share_of_prior(result: LocateResult, favourite: float, ratio: float) -
         Probability of the best place by the scan alone.
     ratio : float
         Likelihood of the best place of the result against that one, by the scan alone.
+    needed : float
+        Least probability by the scan alone for UNIQUE.
     """
     alone, both = favourite * ratio, result.hypotheses[0].probability
     reason = f"{result.reason}; {alone:.0%} likely by the scan alone, {both:.0%} with the prior"
     verdict = result.verdict
-    if verdict is Verdict.UNIQUE and ratio < RIVAL_SHARE:
+    if verdict is Verdict.UNIQUE and alone < needed:
         verdict = Verdict.AMBIGUOUS
-        reason = f"the scan fits {1.0 / ratio:.0f} times better elsewhere than near the prior"
+        reason = (
+            f"the prior chooses this place ({both:.0%} likely with it, {alone:.0%} by the scan "
+            "alone): a second view can confirm it"
+        )
+        if ratio < RIVAL_SHARE:
+            reason = f"the scan fits {1.0 / ratio:.0f} times better elsewhere than near the prior"
     return replace(result, verdict=verdict, reason=reason, probability_without_prior=alone)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from firstfix.amcl.particles import Particles
 from firstfix.belief.belief import Belief
+from firstfix.belief.hints import Source
 from firstfix.belief.prior import Gaussian
 from firstfix.belief.view import View
 from firstfix.changes.counts import LEAST_EXPLAINED, ChangeCounter
@@ -215,7 +216,7 @@ class Localizer:
             if given.hypothesis_id is not None:
                 self._places.add_prior(hint.prior)
             else:  # the robot may have been carried there: the views so far are worth nothing
-                self._places.restart(hint.prior)
+                self._places.restart(hint.prior, Source.PERSON)
         except InputError as error:
             return [self._status(given.stamp, f"hint of {given.source} refused: {error}")]
         self._tracker.stop()
@@ -421,7 +422,7 @@ class Localizer:
             reason = "odometry jumped while several places fit: searching"
             return [self._restart(now.stamp, Event.ODOMETRY_JUMPED, reason)]
         hint = self._hint if self._state is State.VERIFYING_HINT else None
-        self._places.restart(hint.prior if hint is not None else None)
+        self._places.restart(hint.prior if hint is not None else None, Source.PERSON)
         self._tracker.change_frame(before, now)
         return []
 

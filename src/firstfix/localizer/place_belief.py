@@ -19,6 +19,7 @@ from firstfix.belief.belief import (
     with_prior,
 )
 from firstfix.belief.config import BeliefConfig
+from firstfix.belief.hints import Source
 from firstfix.belief.view import View
 from firstfix.core.estimate import Hypothesis, Verdict
 from firstfix.core.scan import Scans, as_scans
@@ -117,33 +118,37 @@ class PlaceBelief:
         fit = f"{rivals} places fit equally well" if rivals > 1 else "the scans do not decide yet"
         return f"chosen by {source}; {fit}"
 
-    def restart(self, prior: Prior | None = None) -> None:
+    def restart(self, prior: Prior | None = None, source: Source = Source.MEASURED) -> None:
         """Discard all views.
 
         Parameters
         ----------
         prior : Prior, optional
             Of the pose at the next view.
+        source : Source
+            Who gives it.
 
         Raises
         ------
         InputError
             If the prior does not fit the map. The belief stays as it was.
         """
-        fresh = begin(self._fields, prior, self._config)
+        fresh = begin(self._fields, None, self._config)
+        if prior is not None:
+            fresh = with_prior(fresh, prior, None, source)
         # A number that was given to a place is never given to another one.
         self.belief = replace(fresh, next_id=self.belief.next_id)
         self._used_at, self._places = None, ()
 
     def add_prior(self, prior: Prior) -> None:
-        """Add a prior of the present pose.
+        """Add a person's prior of the present pose.
 
         Raises
         ------
         InputError
             If the prior does not fit the map. The belief stays as it was.
         """
-        self.belief = with_prior(self.belief, prior, self.belief.odometry)
+        self.belief = with_prior(self.belief, prior, self.belief.odometry, Source.PERSON)
 
     def take_fix(self, source: str, prior: Prior, T_odom_base: SE2 | None) -> None:
         """Add a prior in place of the one before of its source.

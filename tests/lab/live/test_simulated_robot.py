@@ -200,9 +200,12 @@ def test_a_covered_sensor_has_no_valid_range_until_it_is_uncovered(robot):
 
 @pytest.mark.parametrize("name", SENSORS)
 def test_a_sensor_of_the_menu_has_the_view_and_the_range_in_its_name(robot, name):
-    degrees, metres = (float(part.rstrip("° m")) for part in name.split("x"))
+    count, _, numbers = name.rpartition(" of ")
+    degrees, metres = (float(part.rstrip("° m")) for part in numbers.split("x"))
     robot.select_sensor(name)
-    scan = step_until(robot, lambda moment: moment.scan is not None)[-1].scan
+    moment = step_until(robot, lambda moment: moment.scan is not None)[-1]
+    assert len(moment.scans) == (2 if count == "two" else 1)
+    scan = moment.scan
     seen = len(scan.ranges) * scan.angle_increment
     assert np.degrees(seen) == pytest.approx(degrees, abs=1.0)
     assert scan.range_max == metres

@@ -28,7 +28,7 @@ MOST_PEOPLE = 30
 SENSORS: dict[str, Rig] = {
     "360° x 12 m": RIGS["lidar"],
     "180° x 8 m": RIGS["half-lidar"],
-    "two 270° x 8 m": RIGS["two-lasers"],
+    "two of 270° x 8 m": RIGS["two-lasers"],
     "60° x 5 m": RIGS["depth-camera"],
 }
 """The sensors of the menu, by the name in it; the first is the default."""
