@@ -18,7 +18,7 @@ from firstfix.io.logs.npz import read_scan
 from firstfix.site.query import SitePrior, SiteQuery
 from firstfix.web.commands import X, Y, Yaw
 from firstfix.web.json_decoding import decode
-from firstfix.web.locate_queue import Scan
+from firstfix.web.locate_request import Scan
 from firstfix.web.messages import Pose, Row, Share
 from firstfix.web.request_body import JSON
 

@@ -16,7 +16,7 @@ from firstfix.fleet.messages import (
     RobotScans,
     SiteAnswer,
 )
-from firstfix.web.locate_queue import Scan
+from firstfix.web.locate_request import Scan
 from firstfix.web.problem_details import MEDIA_TYPE, Problem
 from firstfix.web.request_body import JSON, NPZ
 
