@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from firstfix.core.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from firstfix.fields import search_grid
 from firstfix.fields.search_grid import SPACING_M, TILE_COLUMNS, TILE_ROWS, build_search_grid
 
 cells = arrays(
@@ -81,14 +80,6 @@ def test_positions_have_the_spacing_for_any_size_of_cells(resolution):
     stride = build_search_grid(OccupancyGrid(np.zeros((50, 50), np.int8), resolution)).stride
     assert stride == 1 or stride % 2 == 0
     assert abs(stride * resolution - SPACING_M) <= max(resolution, 0.05)
-
-
-def test_a_large_map_is_looked_at_more_coarsely(monkeypatch):
-    fine = build_search_grid(hall)
-    monkeypatch.setattr(search_grid, "MAX_POSITIONS", len(fine) // 3)
-    coarse = build_search_grid(hall)
-    assert coarse.stride == 2 * fine.stride
-    assert len(coarse) <= len(fine) // 3
 
 
 def test_tiles_of_a_hall():

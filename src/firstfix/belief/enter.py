@@ -16,8 +16,8 @@ from firstfix.core.estimate import SearchReport
 from firstfix.fields.map_fields import MapFields
 from firstfix.fields.range_table import DIRECTIONS
 from firstfix.fields.search_grid import MAX_POSITIONS
+from firstfix.global_localization.look import find_places
 from firstfix.global_localization.prior import DEEPER, NEAR_LOG
-from firstfix.global_localization.search import search
 
 _ALL_POSES = MAX_POSITIONS * DIRECTIONS
 
@@ -55,7 +55,7 @@ def propose(
     sensor = seen.sensor
     most = config.first_shortlist if len(window) == 1 else config.shortlist
     depth = most * DEEPER if hints else most
-    candidates, report = search(sensor.beams, fields, depth, _ALL_POSES)
+    candidates, report = find_places(sensor.beams, fields, depth, _ALL_POSES)
     poses = compose(candidates.poses, inverse(sensor.T_base_laser))
     if hints:
         poses = poses[_best_and_hinted(poses, most, seen, hints, fields)]

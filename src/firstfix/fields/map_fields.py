@@ -17,6 +17,7 @@ from firstfix.fields import cache
 from firstfix.fields.clearance import chessboard_clearance
 from firstfix.fields.distance import MAX_LIMIT, manhattan_distance, truncated_squares
 from firstfix.fields.endpoint_field import build_endpoint_field
+from firstfix.fields.look_table import BLOCKS, LookTable, build_look_table
 from firstfix.fields.phased_field import PhasedField
 from firstfix.fields.range_table import DIRECTIONS, REACH_M, UNIT_M, build_range_table
 from firstfix.fields.search_grid import (
@@ -30,8 +31,8 @@ from firstfix.fields.search_grid import (
 NEAR_M = 1.0
 
 # Of the arrays in the folder of fields.
-_VERSION = "fields 1"
-_SETTINGS = repr((SPACING_M, MAX_POSITIONS, DIRECTIONS, UNIT_M, REACH_M, NEAR_M, MAX_LIMIT))
+_VERSION = "fields 2"
+_SETTINGS = repr((SPACING_M, BLOCKS, DIRECTIONS, UNIT_M, REACH_M, NEAR_M, MAX_LIMIT))
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,17 +52,29 @@ class MapFields:
     cache_limit : int or None
         Size of the folder above which the least recently used files are removed, bytes; None for
         no limit.
+    most_positions : int
+        A map with more positions is searched where a first look finds it promising.
     """
 
     grid: OccupancyGrid
     cache_dir: Path | None = None
     key: str = ""
     cache_limit: int | None = cache.MAX_TOTAL_BYTES
+    most_positions: int = MAX_POSITIONS
 
     def compute(self, *names: str) -> None:
         """Compute these fields now, so that no scan waits for them."""
         for name in names:
             getattr(self, name)
+
+    @property
+    def is_looked_at(self) -> bool:
+        """Whether a first look chooses where to search."""
+        return len(self.positions) > self.most_positions
+
+    def compute_for_search(self) -> None:
+        """Compute what the search of the whole map reads."""
+        self.compute("clearance", "endpoints", "look" if self.is_looked_at else "ranges")
 
     @property
     def near(self) -> int:
@@ -109,6 +122,11 @@ class MapFields:
         return self._kept("ranges", self._build_ranges)
 
     @cached_property
+    def look(self) -> LookTable:
+        """Shortest and longest ranges of every block of 2 x 2 positions."""
+        return LookTable.unpacked(self._kept("look", self._build_look))
+
+    @cached_property
     def _content(self) -> str:
         return self.key or cache.content_key(
             self.grid.occupied, self.grid.seen_free, repr(self.grid.resolution)
@@ -131,6 +149,12 @@ class MapFields:
     def _build_endpoints(self) -> NDArray[np.uint8]:
         return build_endpoint_field(
             self.squares, self.grid.resolution, self.positions.stride, REACH_M
+        ).packed()
+
+    def _build_look(self) -> NDArray[np.uint8]:
+        grid, stride = self.grid, BLOCKS * self.positions.stride
+        return build_look_table(
+            grid.occupied, grid.seen_free, self.clearance, grid.resolution, stride
         ).packed()
 
     def _build_ranges(self) -> NDArray[np.uint8]:

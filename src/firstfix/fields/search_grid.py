@@ -21,8 +21,8 @@ TILE_COLUMNS = 64
 # Half a robot's width: at the nearest position the map predicts nearly the same scan.
 SPACING_M = 0.2
 
-# Above this the table of expected ranges exceeds 200 MB and the search half a second: the spacing
-# doubles.
+# Above this the table of expected ranges exceeds 200 MB and the search half a second: a first look
+# chooses where to search.
 MAX_POSITIONS = 800_000
 
 
@@ -88,7 +88,7 @@ def build_search_grid(grid: OccupancyGrid) -> SearchGrid:
     """Choose the positions to search in a map.
 
     A block counts where its central cell is free, or no wall and at least half of the block is
-    free. The spacing is 0.2 m and doubles until there are at most ``MAX_POSITIONS`` of them.
+    free. The spacing is 0.2 m.
 
     Parameters
     ----------
@@ -103,9 +103,6 @@ def build_search_grid(grid: OccupancyGrid) -> SearchGrid:
     # Even, so that the end-point field can have two cells to a block; 1 if cells are coarse.
     stride = max(1, 2 * round(SPACING_M / 2 / grid.resolution))
     blocks = _free_blocks(grid.seen_free, grid.occupied, stride)
-    while np.count_nonzero(blocks) > MAX_POSITIONS:
-        stride *= 2
-        blocks = _free_blocks(grid.seen_free, grid.occupied, stride)
     rows, columns = (index.astype(np.int32) for index in np.nonzero(blocks))
     tiles_across = -(-blocks.shape[1] // TILE_COLUMNS)
     tile = (rows // TILE_ROWS).astype(np.int64) * tiles_across + columns // TILE_COLUMNS

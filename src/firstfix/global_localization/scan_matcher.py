@@ -20,6 +20,7 @@ from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS
 from firstfix.global_localization.config import LocateConfig, Method
 from firstfix.global_localization.exhaustive import BASIC, FAST, ExhaustiveSearch
+from firstfix.global_localization.look import find_places
 from firstfix.global_localization.places import distinct_places
 from firstfix.global_localization.prior import (
     SHARE_OF_SMALL_VIEW,
@@ -29,7 +30,6 @@ from firstfix.global_localization.prior import (
 )
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.scoring import score_poses, search_locally
-from firstfix.global_localization.search import search
 from firstfix.global_localization.searchable import check_positions, check_searchable
 from firstfix.global_localization.sensors import (
     at_one_time,
@@ -107,7 +107,7 @@ class ScanMatcher:
         self._exhaustive: ExhaustiveSearch | None = None
         if self.method is Method.FAST:
             check_positions(self.fields)
-            self.fields.compute("endpoints", "ranges")
+            self.fields.compute_for_search()
         else:
             poses = FAST if self.method is Method.PAPER else BASIC
             self._exhaustive = ExhaustiveSearch(self.fields, poses)
@@ -254,7 +254,7 @@ def locate(
 
     known = PlacePrior(prior, fields.grid, scan, len(beams))
     depth = known.depth(config.shortlist)
-    candidates, report = search(beams, fields, depth, config.max_poses)
+    candidates, report = find_places(beams, fields, depth, config.max_poses)
     poses = refine_on_field(known.chosen(candidates.poses, config.shortlist), beams, fields)
     first_look = verify(poses, beams.thinned(FIRST_LOOK_BEAMS), fields)
     best = [
@@ -364,7 +364,7 @@ def _judge(
     verdict, reason = judge(
         probabilities, verification.evidence(int(ranked[0])), config.unique_probability
     )
-    if report.proven:
+    if report.searched == 1.0:
         return verdict, reason
     # The part that was not searched may contain a better place.
     unseen = f"; max_poses left {1.0 - report.searched:.0%} of the map unsearched"

@@ -131,7 +131,7 @@ def _queries(beams: Beams, fields: MapFields) -> _Queries:
     hit = seen.hit[keep]
     counts = np.minimum(np.rint(seen.ranges[keep] / range_table.UNIT_M), range_table.FARTHEST)
     return _Queries(
-        offsets=_endpoint_offsets(ends, fields),
+        offsets=endpoint_offsets(ends, fields),
         directions=np.pad(directions[keep], (0, padding)),
         counts=np.pad(counts.astype(np.uint8), (0, padding)),
         through=np.pad(np.where(hit, THROUGH_LIMIT, NO_RETURN_LIMIT), (0, padding)),
@@ -142,7 +142,21 @@ def _queries(beams: Beams, fields: MapFields) -> _Queries:
     )
 
 
-def _endpoint_offsets(ends: Beams, fields: MapFields) -> NDArray[np.int64]:
+def endpoint_offsets(ends: Beams, fields: MapFields) -> NDArray[np.int64]:
+    """Return where beams end in `MapFields.endpoints`, relative to the block of a position.
+
+    Parameters
+    ----------
+    ends : Beams
+        Shorter than `range_table.REACH_M`.
+    fields : MapFields
+        The prepared map.
+
+    Returns
+    -------
+    ndarray of int64, shape (DIRECTIONS, len(ends))
+        Offsets for every heading.
+    """
     headings = np.arange(DIRECTIONS)[:, None] * (FULL_TURN / DIRECTIONS)
     cells = ends.ranges / fields.grid.resolution
     start_x, start_y = ends.starts.T / fields.grid.resolution

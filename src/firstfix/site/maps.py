@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
@@ -39,6 +39,10 @@ class PreparedMap:
     entry: SiteMap
     fields: MapFields
     content: str
+
+
+Maps = Callable[[str], PreparedMap]
+"""Loads a map by its id."""
 
 
 class PreparedMaps:
@@ -116,7 +120,8 @@ def prepared(entry: SiteMap, cache_dir: Path | None) -> PreparedMap:
     else:
         layers = cache.load_or_build(key, lambda: _layers(entry.path), cache_dir, limit=None)
     grid = _grid_of(layers, header)
-    fields = MapFields(grid, cache_dir, key, cache_limit=None)
+    # The tables of the exhaustive search would take most of the memory of a site.
+    fields = MapFields(grid, cache_dir, key, cache_limit=None, most_positions=0)
     check_positions(fields)
     return PreparedMap(
         entry, fields, cache.content_key(grid.cells, repr((grid.resolution, *grid.T_map_grid)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,16 +12,15 @@ from firstfix.belief.prior import FLOOR
 from firstfix.core.estimate import Hypothesis
 from firstfix.core.scan import LaserScan
 from firstfix.global_localization.beams import FEWEST_HITS, Beams
-from firstfix.global_localization.config import MAX_POSES
 from firstfix.global_localization.frames import bases_in_map
+from firstfix.global_localization.look import look_into
 from firstfix.global_localization.places import distinct_places
 from firstfix.global_localization.prior import DEEPER
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
-from firstfix.global_localization.search import search
 from firstfix.global_localization.sensors import joint_beams
 from firstfix.global_localization.verdict import WRONG_MAP_COST, log_likelihoods, with_prior
 from firstfix.global_localization.verify import verified_place, verify
-from firstfix.site.maps import PreparedMap
+from firstfix.site.maps import Maps, PreparedMap
 from firstfix.site.places import SitePlace
 from firstfix.site.query import SiteQuery
 
@@ -32,8 +31,6 @@ POOL_PLACES = 1000
 CAREFUL_PLACES = 64
 LISTED_PLACES = 24
 FIRST_BEAMS = 60
-
-Maps = Callable[[str], PreparedMap]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,12 +112,12 @@ def _searched(
 ) -> _Pool:
     """Search every map, and keep the best places of all."""
     found = []
-    for i, map_id in enumerate(map_ids):
+    # What is near a prior may be far down the list.
+    is_hinted = any(query.prior_in(map_id) is not None for map_id in map_ids)
+    depth = MAP_PLACES * DEEPER if is_hinted else MAP_PLACES
+    looks = look_into(beams, [maps(map_id).fields for map_id in map_ids], depth)
+    for i, (map_id, candidates) in enumerate(zip(map_ids, looks, strict=True)):
         fields = maps(map_id).fields
-        is_hinted = query.prior_in(map_id) is not None
-        # What is near a prior may be far down the list.
-        depth = MAP_PLACES * DEEPER if is_hinted else MAP_PLACES
-        candidates, _ = search(beams, fields, depth, MAX_POSES)
         bases = bases_in_map(fields.grid, scan, candidates.poses)
         logs = prior_logs(query, map_id, bases)
         index = np.full(len(logs), i)

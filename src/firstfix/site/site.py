@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from firstfix.fields.cache import remove_unused
 from firstfix.fields.map_fields import MapFields
 from firstfix.io.maps.site_yaml import SiteDescription, SiteMap, Transition, read_site
 from firstfix.site.judge import judge_site
-from firstfix.site.look import Looked, look_at_all
+from firstfix.site.look import PROMISING, Looked, look_at_all, look_at_maps
 from firstfix.site.maps import PreparedMaps
 from firstfix.site.places import SiteCandidates, SitePlace
 from firstfix.site.query import SitePrior, SiteQuery
@@ -31,7 +31,7 @@ from firstfix.site.views import search_views
 MEMORY_LIMIT = 2 << 30
 """Default size of the prepared maps that are held at once, bytes."""
 
-FIELDS = ("squares", "clearance", "endpoints", "ranges")
+FIELDS = ("squares", "clearance", "endpoints", "look")
 """What the search reads of a prepared map."""
 
 # Places that may turn out to be one: only of these the surroundings are compared.
@@ -227,10 +227,10 @@ class Site:
             Some of the maps; by default all.
         """
         chosen = self.map_ids if map_ids is None else tuple(map_ids)
-        for map_id in chosen:
-            self._entry(map_id)
-        del query  # every map is promising, whatever was seen
-        return look_at_all(chosen)
+        usable = [name for name in chosen if self._is_usable(self._entry(name))]
+        if map_ids is None and len(usable) <= PROMISING:
+            return look_at_all(usable)
+        return look_at_maps(query, usable, self._maps.get)
 
     def search(self, query: SiteQuery, map_ids: Sequence[str]) -> SiteCandidates:
         """Search some of the maps; refine and verify the best places in one pool.
@@ -256,10 +256,10 @@ class Site:
             self._with_surroundings(places),
             totals,
             searched=tuple(usable),
-            faults=self._faults_of(map_ids),
+            faults=self._faults_of(self._entries),
         )
 
-    def _faults_of(self, map_ids: Sequence[str]) -> tuple[str, ...]:
+    def _faults_of(self, map_ids: Iterable[str]) -> tuple[str, ...]:
         return tuple(self._faults[name] for name in map_ids if name in self._faults)
 
     def _with_surroundings(self, places: Sequence[SitePlace]) -> tuple[SitePlace, ...]:

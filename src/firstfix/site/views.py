@@ -16,10 +16,10 @@ from firstfix.belief.joint import joint_log_likelihoods, power_of
 from firstfix.belief.prior import FLOOR
 from firstfix.belief.several import distinct_views
 from firstfix.belief.view import View
-from firstfix.site.maps import PreparedMap
+from firstfix.site.maps import Maps, PreparedMap
 from firstfix.site.places import SitePlace
 from firstfix.site.query import SiteQuery
-from firstfix.site.search import Maps, as_place
+from firstfix.site.search import as_place
 
 
 @dataclass(frozen=True, eq=False)
