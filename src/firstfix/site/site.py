@@ -250,7 +250,7 @@ class Site:
         usable = [name for name in map_ids if self._is_usable(self._entry(name))]
         search_maps = search_one_look if query.is_one_look else search_views
         if not usable:
-            return SiteCandidates((), np.empty(0), (), self._faults_of(map_ids))
+            return SiteCandidates((), np.empty(0), (), self._faults_of(self._entries))
         places, totals = search_maps(query, usable, self._maps.get)
         return SiteCandidates(
             self._with_surroundings(places),
