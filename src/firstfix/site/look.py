@@ -65,11 +65,13 @@ class Looked:
         parts : sequence of Looked
             At different maps of one site; at least one.
         """
+        map_ids = tuple(name for part in parts for name in part.map_ids)
+        most = max(part.most for part in parts)
         return cls(
-            map_ids=tuple(name for part in parts for name in part.map_ids),
+            map_ids=map_ids,
             scores=np.concatenate([part.scores for part in parts]),
-            recall=min(part.recall for part in parts),
-            most=max(part.most for part in parts),
+            recall=1.0 if len(map_ids) <= most else min(part.recall for part in parts),
+            most=most,
         )
 
 
