@@ -42,9 +42,9 @@ check: $(STAMP)
 	$(BIN)/python -m pytest -n 3 --dist worksteal -q -m "not slow" $(TEST_ARGS)
 
 bench: $(STAMP)
-	$(BIN)/firstfix bench --suite paper --json out/paper.json --report out/paper
+	$(BIN)/firstfix bench --suite paper --out out/paper.json --report out/paper
 	$(if $(strip $(CASES)),$(BIN)/firstfix bench $(CASES) --method fast --method paper --wrong-map \
-	    --json out/bench.json --report out/bench,@echo 'no cases in ../shared/cases: to try some, \
+	    --out out/bench.json --report out/bench,@echo 'no cases in ../shared/cases: to try some, \
 	    name folders with map.yaml and scans.npz: make bench CASES="folder ..."')
 
 recording: $(STAMP)

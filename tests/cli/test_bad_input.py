@@ -134,7 +134,7 @@ def test_a_case_with_broken_words(cli, unique: Files, tmp_path: Path, meta: str)
 
 def test_figures_that_cannot_be_written(cli, unique: Files, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
-    assert_one_line(cli("bench", unique[0].parent, "--json", "file/bench.json"), "file/bench.json")
+    assert_one_line(cli("bench", unique[0].parent, "--out", "file/bench.json"), "file/bench.json")
     assert_one_line(cli("bench", unique[0].parent, "--report", "file/report"), "file/report")
 
 
@@ -147,7 +147,7 @@ def test_a_case_without_truth(cli, unique: Files, tmp_path: Path) -> None:
     (folder / "scans.npz").unlink()
     spoil_scan(unique, folder, true_pose=None).rename(folder / "scans.npz")
     (tmp_path / "bench.json").write_text("earlier figures")
-    assert_one_line(cli("bench", folder, "--json", "bench.json"), "true poses")
+    assert_one_line(cli("bench", folder, "--out", "bench.json"), "true poses")
     assert (tmp_path / "bench.json").read_text() == "earlier figures"
 
 

@@ -44,7 +44,7 @@ def test_a_world_is_simulated_and_reported(
 ) -> None:
     monkeypatch.setattr(kidnap_scripts, "_NOTHING_S", 20.0)
     arguments = ["--worlds", "house", "--scenarios", 2, "--seed", 5, "--jobs", 2]
-    ended = cli("bench", "--kidnap", *arguments, "--json", "k.json", "--report", "out")
+    ended = cli("bench", "--kidnap", *arguments, "--out", "k.json", "--report", "out")
     assert ended.status == 0, ended
     assert ended.out.startswith("| world ")
     assert "| crowd " in ended.out
@@ -118,7 +118,7 @@ def test_cases_that_cannot_be_spliced_are_named(cli, drive: Path, cases: Path) -
         (["--kidnap", "--worlds", "office,moon"], "'moon'"),
         (["--kidnap", "--worlds", ""], "''"),
         (["--kidnap", "--cases", "nowhere"], "nowhere"),
-        (["--kidnap", "--worlds", "house", "--json", "file/b.json"], "file/b.json"),
+        (["--kidnap", "--worlds", "house", "--out", "file/b.json"], "file/b.json"),
         (["--kidnap", "--worlds", "house", "--report", "file/out"], "file/out"),
         (["--scenarios", "3"], "--kidnap"),
         (["--worlds", "office"], "--kidnap"),

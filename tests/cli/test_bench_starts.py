@@ -10,7 +10,7 @@ import pytest
 @pytest.mark.usefixtures("in_this_process")
 def test_starts_are_reported_by_sensor(cli, drive: Path, cases: Path, tmp_path: Path) -> None:
     sensors = ["--sensor", "60,3", "--sensor", "recorded"]
-    arguments = ["--starts", "--runs", 2, "--seed", 1, "--json", "s.json", "--report", "out"]
+    arguments = ["--starts", "--runs", 2, "--seed", 1, "--out", "s.json", "--report", "out"]
     ended = cli("bench", drive, cases, *sensors, *arguments)
     assert ended.status == 0, ended
     assert "left out: unique (no odometry)" in ended.err
@@ -25,7 +25,7 @@ def test_starts_are_reported_by_sensor(cli, drive: Path, cases: Path, tmp_path: 
 @pytest.mark.usefixtures("in_this_process")
 def test_scans_are_located_by_every_sensor(cli, cases: Path, tmp_path: Path) -> None:
     sensors = ["--sensor", "recorded", "--sensor", "30,3"]
-    ended = cli("bench", cases / "unique", "--limit", 2, *sensors, "--json", "b.json")
+    ended = cli("bench", cases / "unique", "--limit", 2, *sensors, "--out", "b.json")
     assert ended.status == 0, ended
     document = json.loads((tmp_path / "b.json").read_text())
     assert [row["sensor"] for row in document["totals"]] == ["recorded", "30° x 3 m"]

@@ -13,7 +13,7 @@ from firstfix.lab.metrics.paper_trial import Start
 @pytest.mark.slow
 def test_the_papers_experiments_are_run_and_reported(cli, tmp_path: Path) -> None:
     arguments = ["--worlds", "house", "--runs", 1, "--seed", 2]
-    ended = cli("bench", "--suite", "paper", *arguments, "--json", "p.json", "--report", "out")
+    ended = cli("bench", "--suite", "paper", *arguments, "--out", "p.json", "--report", "out")
     assert ended.status == 0, ended
     assert "| house " in ended.out
     document = json.loads((tmp_path / "p.json").read_text())
@@ -25,7 +25,7 @@ def test_the_papers_experiments_are_run_and_reported(cli, tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_steps_are_left_out_over_cases(cli, cases: Path, tmp_path: Path) -> None:
-    arguments = [cases / "unique", "--limit", 2, "--json", "a.json", "--report", "out"]
+    arguments = [cases / "unique", "--limit", 2, "--out", "a.json", "--report", "out"]
     ended = cli("bench", "--suite", "ablation", *arguments)
     assert ended.status == 0, ended
     assert "verdict law" in ended.out
@@ -40,7 +40,7 @@ def test_costs_of_one_office_are_measured(
 ) -> None:
     one_office = partial(scaling_tasks, offices=(1,), beams=(100,))
     monkeypatch.setattr("firstfix.lab.benchmarks.scaling_tasks", one_office)
-    ended = cli("bench", "--suite", "scaling", "--json", "s.json", "--report", "out")
+    ended = cli("bench", "--suite", "scaling", "--out", "s.json", "--report", "out")
     assert "| paper " in ended.out
     document = json.loads((tmp_path / "s.json").read_text())
     assert [row["beams"] for row in document["beams"]] == [100, 100]
@@ -55,7 +55,7 @@ def test_costs_of_one_office_are_measured(
         (["--suite", "paper", "--wrong-map"], "--wrong-map"),
         (["--suite", "paper", "--limit", "3"], "--limit"),
         (["--suite", "paper", "--kidnap"], "--kidnap"),
-        (["--suite", "paper", "--worlds", "house", "--json", "file/b.json"], "file/b.json"),
+        (["--suite", "paper", "--worlds", "house", "--out", "file/b.json"], "file/b.json"),
         (["--suite", "paper", "--worlds", "house", "--report", "file/out"], "file/out"),
         (["somewhere", "--suite", "paper"], "CASES"),
         (["somewhere", "--suite", "scaling"], "CASES"),

@@ -10,7 +10,7 @@ import pytest
 def test_cases_with_odometry_are_tracked_and_others_named(
     cli, cases: Path, drive: Path, tmp_path: Path
 ) -> None:
-    ended = cli("bench", drive, cases, "--track", "--jobs", 2, "--json", "out/bench.json")
+    ended = cli("bench", drive, cases, "--track", "--jobs", 2, "--out", "out/bench.json")
     assert ended.status == 0, ended
     assert "left out, because without odometry: alike, unique" in ended.err
     assert ended.out.startswith("| case ")
@@ -29,7 +29,7 @@ def test_seed_and_parameters_reach_the_filter(cli, drive: Path, tmp_path: Path) 
     )
     errors = []
     for options in ([], ["--seed", 3], ["--seed", 4]):
-        arguments = ["--track", "--params", "amcl.yaml", "--json", "b.json", *options]
+        arguments = ["--track", "--params", "amcl.yaml", "--out", "b.json", *options]
         assert cli("bench", drive, *arguments).status == 0
         (row,) = json.loads((tmp_path / "b.json").read_text())["cases"]
         assert 50 <= row["particles_mean"] <= 60
@@ -47,7 +47,7 @@ def test_seed_and_parameters_reach_the_filter(cli, drive: Path, tmp_path: Path) 
         (["--seed", "1"], "--track"),
         (["--params", "amcl.yaml"], "--track"),
         (["--track", "--params", "nowhere.yaml"], "nowhere.yaml"),
-        (["--track", "--json", "file/b.json"], "file/b.json"),
+        (["--track", "--out", "file/b.json"], "file/b.json"),
     ],
 )
 def test_options_that_do_not_fit_are_refused(
@@ -63,7 +63,7 @@ def test_options_that_do_not_fit_are_refused(
 
 @pytest.mark.usefixtures("in_this_process")
 def test_cases_without_any_odometry_are_refused(cli, cases: Path, tmp_path: Path) -> None:
-    ended = cli("bench", cases / "unique", "--track", "--json", "b.json")
+    ended = cli("bench", cases / "unique", "--track", "--out", "b.json")
     assert (ended.status, ended.out) == (2, "")
     assert "expected cases with odometry, received only unique without" in ended.err
     assert not (tmp_path / "b.json").exists()

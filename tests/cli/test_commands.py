@@ -43,7 +43,7 @@ def test_version(cli) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_this_process")
 def test_bench_compares_with_the_truth_and_writes_it_down(cli, cases: Path, tmp_path: Path) -> None:
-    arguments = ["--wrong-map", "--jobs", 2, "--json", "out/bench.json", "--report", "out/report"]
+    arguments = ["--wrong-map", "--jobs", 2, "--out", "out/bench.json", "--report", "out/report"]
     ended = cli("bench", cases, *arguments)
     assert ended.status == 0, ended
     document = json.loads((tmp_path / "out" / "bench.json").read_text())
@@ -61,7 +61,7 @@ def test_bench_compares_with_the_truth_and_writes_it_down(cli, cases: Path, tmp_
 
 @pytest.mark.slow
 def test_bench_takes_single_cases_and_a_limit(cli, cases: Path, tmp_path: Path) -> None:
-    ended = cli("bench", cases / "unique", "--limit", 1, "--wrong-map", "--json", "b.json")
+    ended = cli("bench", cases / "unique", "--limit", 1, "--wrong-map", "--out", "b.json")
     assert ended.status == 0
     document = json.loads((tmp_path / "b.json").read_text())
     assert document["total"]["n"] == 1

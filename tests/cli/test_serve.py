@@ -68,7 +68,7 @@ def test_a_simulated_robot_is_served_until_ctrl_c() -> None:
         assert answer["truth"] is not None
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=PATIENCE_S)
-        assert (process.returncode, out, err) == (0, "", "")
+        assert (process.returncode, out, err) == (130, "", "")
 
 
 @pytest.mark.slow

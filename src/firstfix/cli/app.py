@@ -7,6 +7,7 @@ stderr; 130 interrupted.
 from __future__ import annotations
 
 import gc
+import logging
 import os
 import signal
 import sys
@@ -27,6 +28,7 @@ from firstfix.cli.nodes import AFTER_DASHES, PASSED_ON, dds, ros1, ros2
 from firstfix.cli.serve import serve
 from firstfix.cli.site import site_app
 from firstfix.cli.track import track
+from firstfix.cli.usage import PlainUsage
 from firstfix.core.errors import FirstfixError
 
 WRONG_INPUT = 2
@@ -37,23 +39,22 @@ app = typer.Typer(
     name="firstfix",
     help="Find a robot anywhere in its map from one 2D LIDAR scan, without motion.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",  # paragraphs flow, and what stands in brackets stays
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command()(locate)
-app.command()(track)
-app.command()(bench)
+app.command(cls=PlainUsage)(locate)
+app.command(cls=PlainUsage)(track)
+app.command(cls=PlainUsage)(bench)
 app.add_typer(map_app, name="map")
 app.add_typer(site_app, name="site")
 app.add_typer(fleet_app, name="fleet")
-app.command()(demo)
-app.command(context_settings=AFTER_DASHES)(serve)
-app.command(context_settings=PASSED_ON)(ros1)
-app.command(context_settings=PASSED_ON)(ros2)
-app.command()(dds)
-app.command()(doctor)
+app.command(cls=PlainUsage)(demo)
+app.command(cls=PlainUsage, context_settings=AFTER_DASHES)(serve)
+app.command(cls=PlainUsage, context_settings=PASSED_ON)(ros1)
+app.command(cls=PlainUsage, context_settings=PASSED_ON)(ros2)
+app.command(cls=PlainUsage)(dds)
+app.command(cls=PlainUsage)(doctor)
 
 
 def _show_version(asked: bool) -> None:
@@ -96,6 +97,8 @@ def main() -> None:
     # Loading numba makes a million objects that live to the end: looking through them for garbage
     # again and again, and once more at exit, takes a third of a short command's time.
     gc.set_threshold(200_000, 20, 100)
+    if not sys.stderr.isatty():  # in a pipe no progress is shown
+        logging.getLogger("firstfix.kernels").addHandler(logging.NullHandler())
     status = run()
     # A second Ctrl-C must not interrupt the end of the interpreter, whose default is to die of it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -34,7 +35,14 @@ class Suite(Enum):
     ABLATION = "ablation"
 
 
-# Which options belong to which benchmark. --json belongs to all.
+class Printed(Enum):
+    """What is printed."""
+
+    TABLES = "tables"
+    JSON = "one JSON object"
+
+
+# Which options belong to which benchmark. --json and --out belong to all.
 _CASES = {"CASES", "--floors", "--sensor"}
 _LOCATE = {*_CASES, "--method", "--wrong-map", "--limit", "--jobs", "--report"}
 _OPTIONS = {
@@ -80,9 +88,11 @@ def bench(
             show_default=False,
         ),
     ] = None,
-    json_file: Annotated[
-        Path | None,
-        typer.Option("--json", metavar="FILE", help="Write all figures to a file."),
+    as_object: Annotated[
+        bool, typer.Option("--json", help="Print all figures as one JSON object.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write all figures to a JSON file.")
     ] = None,
     report: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write a report with plots to a folder.")
@@ -239,14 +249,14 @@ def bench(
         names = list(PAPER_WORLDS) if worlds is None else parse_worlds(worlds, PAPER_WORLDS)
         benchmark = benchmarks.paper_benchmark(names, runs or PAPER_DRIVES, first_seed)
     elif measure == "--suite scaling":
-        check_targets(json_file, report)  # drawing the maps takes a while
+        check_targets(out, report)  # drawing the maps takes a while
         benchmark = benchmarks.scaling_benchmark(first_seed)
     elif measure == "--suite ablation":
         benchmark = benchmarks.ablation_benchmark(found, limit)
     else:
         methods = list(dict.fromkeys(method or [Method.FAST]))
         benchmark = benchmarks.locate_benchmark(found, methods, limit, with_wrong_maps=wrong_map)
-    _run(benchmark, jobs, json_file, report)
+    _run(benchmark, jobs, Printed.JSON if as_object else Printed.TABLES, out, report)
 
 
 def _check_options(asked: list[str], given: dict[str, Any]) -> str:
@@ -277,16 +287,21 @@ def _check_options(asked: list[str], given: dict[str, Any]) -> str:
     return measure
 
 
-def _run(benchmark: Benchmark, jobs: int, json_file: Path | None, report: Path | None) -> None:
+def _run(
+    benchmark: Benchmark, jobs: int, printed: Printed, out: Path | None, report: Path | None
+) -> None:
     from firstfix.lab.reports.output_files import check_targets, write_json
 
-    check_targets(json_file, report)
+    check_targets(out, report)
     with progress(len(benchmark.tasks), "bench") as done:
         summary = benchmark.run(jobs, done)
     for note in summary.notes:
         typer.echo(f"note: {note}", err=True)
-    typer.echo("\n".join(summary.tables), nl=False)
-    if json_file is not None:
-        write_json(summary.document, json_file)
+    if printed is Printed.JSON:
+        typer.echo(json.dumps(summary.document, allow_nan=False))
+    else:
+        typer.echo("\n".join(summary.tables), nl=False)
+    if out is not None:
+        write_json(summary.document, out)
     if report is not None and summary.write_report is not None:
         typer.echo(f"report: {summary.write_report(report)}", err=True)

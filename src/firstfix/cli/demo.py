@@ -101,7 +101,7 @@ def _run_scenario(grid: OccupancyGrid, world: str, seed: int, plot: Path) -> Non
     if can_draw():
         picture = f"{draw_scenario(grid, steps, plot)}"
     typer.echo(f"Picture    {picture}")
-    program = "firstfix" if shutil.which("firstfix") else sys.argv[0]
+    program = "firstfix" if shutil.which("firstfix") else f"{Path(sys.executable).name} -m firstfix"
     typer.echo(f"Live page  run `{program} demo` and open the address that it prints")
     typer.echo(f"Result     {_result_text(episodes)}")
     if not all(episode.is_tracked or episode.is_correctly_ambiguous for episode in episodes):

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
-from collections.abc import Sequence
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from firstfix.cli.answer import print_answer
 from firstfix.cli.prior_options import NearPoses, Radius, RegionText, prior_of
 from firstfix.cli.progress import progress, working
 from firstfix.cli.sensor_options import (
@@ -25,17 +25,12 @@ from firstfix.core.errors import InputError, ScanError
 from firstfix.global_localization.config import Method
 
 if TYPE_CHECKING:
-    from firstfix.core.estimate import Hypothesis, LocateResult
+    from firstfix.core.estimate import LocateResult
     from firstfix.core.recording import Recording
-    from firstfix.core.se2 import SE2
     from firstfix.global_localization.prior import Prior
     from firstfix.global_localization.scan_matcher import ScanMatcher
 
 NO_ANSWER = 1
-
-# What is listed for a person: places that are likely at all, and some to compare them with.
-_LEAST_PROBABILITY = 0.001
-_FEWEST_ROWS, _MOST_ROWS = 3, 10
 
 
 def locate(
@@ -89,7 +84,9 @@ def locate(
         from firstfix.fields.cache import cache_folder
         from firstfix.global_localization.scan_matcher import ScanMatcher
 
+        began = time.perf_counter()
         matcher = ScanMatcher(grid, method=method, cache_dir=cache_folder())
+        prepared_s = time.perf_counter() - began
     # On a terminal the answers themselves show how far it is.
     with progress(0 if sys.stdout.isatty() else len(chosen), "locating") as done:
         for i in chosen:
@@ -98,7 +95,7 @@ def locate(
             if as_lines:
                 typer.echo(json.dumps(result.to_dict(i, truth), allow_nan=False))
             else:
-                typer.echo(f"{f'scan {i}: ' if every else ''}{_as_text(result, truth)}")
+                print_answer(result, truth, prepared_s, f"scan {i}: " if every else "")
             done(result.verdict.value)
     if plot is not None:
         from firstfix.plots.result_picture import draw_result
@@ -140,73 +137,3 @@ def _only(count: int, index: int) -> range:
             remedy="choose a smaller --index",
         )
     return range(index, index + 1)
-
-
-def _as_text(result: LocateResult, truth: SE2 | None) -> str:
-    """Describe an answer in lines for a person; ``truth`` is the true ``T_map_base``."""
-    import numpy as np
-
-    from firstfix.core.pose_error import PoseError
-    from firstfix.core.se2 import SE2
-    from firstfix.lab.reports.text import pose_text
-
-    lines = [f"{result.verdict.value}: {result.reason}"]
-    best, search = result.best, result.search
-    if best is not None:
-        sigma = np.sqrt(np.clip(np.diagonal(best.covariance), 0.0, None))
-        lines += [
-            f"pose         {pose_text(best.pose)}",
-            f"σ            {pose_text(SE2.from_array(sigma))}",
-            f"probability  {best.probability:.1%}",
-            f"evidence     {_evidence_text(best)}",
-        ]
-        if truth is not None:
-            error = PoseError.between(best.pose, truth)
-            degrees = math.degrees(error.radians)
-            lines.append(f"truth        {error.metres:.3f} m, {degrees:.2f}° away")
-    proof = "optimum proven" if search.proven else "optimum not proven"
-    lines += [
-        f"search       {search.poses:,} poses, {search.searched:.0%} searched, {proof}",
-        f"time         {result.elapsed_s:.3f} s",
-    ]
-    rows = _rows(result)
-    if len(result.hypotheses) > 1:
-        lines += ["", _hypothesis_table(result.hypotheses[:rows]).rstrip()]
-    if len(result.hypotheses) > rows:
-        lines.append(f"and {len(result.hypotheses) - rows} less likely ones (--json lists all)")
-    return "\n".join(lines)
-
-
-def _evidence_text(hypothesis: Hypothesis) -> str:
-    e = hypothesis.evidence
-    return (
-        f"{e.explained:.0%} of {e.beams} beams explained, {e.short:.0%} short, "
-        f"{e.through_wall:.0%} through a wall, {e.unknown:.0%} in unknown space"
-    )
-
-
-def _rows(result: LocateResult) -> int:
-    likely = sum(h.probability >= _LEAST_PROBABILITY for h in result.hypotheses)
-    return min(_MOST_ROWS, max(_FEWEST_ROWS, likely))
-
-
-def _hypothesis_table(hypotheses: Sequence[Hypothesis]) -> str:
-    from firstfix.lab.reports.text import markdown_table
-
-    head = ["rank", "x m", "y m", "yaw °", "probability", "score", "explained", "through wall"]
-    return markdown_table(
-        head,
-        [
-            [
-                str(rank),
-                f"{h.pose.x:.3f}",
-                f"{h.pose.y:.3f}",
-                f"{math.degrees(h.pose.yaw):.2f}",
-                f"{h.probability:.1%}",
-                f"{h.score:.4f}",
-                f"{h.evidence.explained:.0%}",
-                f"{h.evidence.through_wall:.0%}",
-            ]
-            for rank, h in enumerate(hypotheses, 1)
-        ],
-    )

@@ -11,6 +11,7 @@ import typer
 
 from firstfix.cli.map_changes import changes
 from firstfix.cli.progress import progress
+from firstfix.cli.usage import PlainUsage
 from firstfix.core.errors import MapError
 from firstfix.core.scan import MAX_BEAMS
 
@@ -27,7 +28,7 @@ MOST_CELLS = 10_000_000
 MOST_PAIRS = 10
 
 map_app = typer.Typer(help="Look at a map.", no_args_is_help=True)
-map_app.command()(changes)
+map_app.command(cls=PlainUsage)(changes)
 
 PANEL = "Perceptual aliasing: which places look alike"
 MapPath = Annotated[Path, typer.Argument(metavar="MAP", help="YAML of a map_server map.")]
@@ -71,7 +72,7 @@ Seed = Annotated[
 ]
 
 
-@map_app.command()
+@map_app.command(cls=PlainUsage)
 def check(
     map_path: MapPath,
     samples: Samples = None,
@@ -118,7 +119,7 @@ def check(
         _print_aliasing(load_map(map_path), sensor(beams, fov, reach), samples, seed)
 
 
-@map_app.command()
+@map_app.command(cls=PlainUsage)
 def show(
     map_path: MapPath,
     plot: Annotated[

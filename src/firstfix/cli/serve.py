@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 PORT = 8642
 SHORTEST_TOKEN = 8
+INTERRUPTED = 130
 
 
 class Transport(Enum):
@@ -201,9 +202,10 @@ def serve_simulated(
         page = Page("sim", store, executor, access, on_first_viewer=robot.resume)
         node.start()
         _announce(listening, access)
-        with suppress(KeyboardInterrupt):  # the usual end
+        with suppress(KeyboardInterrupt):  # the usual end; some versions of uvicorn raise it
             make_server(page).run(sockets=[listening])
         node.stop()
+    raise typer.Exit(INTERRUPTED)
 
 
 def serve_robot(

@@ -10,6 +10,7 @@ import typer
 
 from firstfix.cli.progress import progress
 from firstfix.cli.sensor_options import BaseFrame, LaserFrame, LaserPose, Topics, read_log
+from firstfix.cli.usage import PlainUsage
 from firstfix.core.errors import ScanError
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ SitePath = Annotated[
 ]
 
 
-@site_app.command()
+@site_app.command(cls=PlainUsage)
 def locate(
     site_path: SitePath,
     scans: Annotated[
@@ -73,7 +74,7 @@ def locate(
         raise typer.Exit(NO_ANSWER)
 
 
-@site_app.command()
+@site_app.command(cls=PlainUsage)
 def check(
     site_path: SitePath,
     samples: Annotated[

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import logging
 import os
 import shutil
 import tempfile
@@ -20,10 +21,12 @@ from typing import Any, TypeVar, cast
 
 import numba
 from numba import njit
+from numba.core import event
 
 from firstfix.fields.cache import cache_folder
 
 _SETTINGS: Any = numba.config  # set from the environment when numba was imported
+_EVENTS: Any = event
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
@@ -33,6 +36,8 @@ _CONSTANTS = ("core/angles.py", "fields/search_grid.py")
 
 # Less to compile: no check for a division by zero, no entry point for C.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+
+_log = logging.getLogger("firstfix.kernels")
 
 _PREFIX = "kernels-"
 # Other versions may share the folder: keep what was used lately.
@@ -110,3 +115,23 @@ def _remove_unused(parent: Path, used: Path) -> None:
         for folder in newest[_KEPT:]:
             if folder != used and time.time() - times[folder] > _UNUSED_AFTER_S:
                 shutil.rmtree(folder, ignore_errors=True)
+
+
+class _Announcer(event.Listener):
+    """Logs once in a process that kernels are compiled; those on disk are loaded instead."""
+
+    def on_start(self, started: Any) -> None:
+        """Log before the first kernel."""
+        if started.data["dispatcher"].py_func.__module__.startswith("firstfix."):
+            _EVENTS.unregister("numba:compile", self)
+            _log.warning(
+                "Compiling kernels, once on this machine: up to half a minute. "
+                "They are kept in %s.",
+                kernel_folder(),
+            )
+
+    def on_end(self, _: Any) -> None:
+        """Log nothing."""
+
+
+_EVENTS.register("numba:compile", _Announcer())
