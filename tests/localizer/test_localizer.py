@@ -52,6 +52,26 @@ def test_a_drive_with_drifting_wheels_is_followed(robot_in, driven, hall_plan, o
     assert len(of(InitialPose, robot.outputs)) == 1
 
 
+def test_the_pose_of_a_scan_does_not_wait_for_the_search_in_the_background(
+    robot_in, driven, hall_plan, of
+):
+    robot = robot_in(hall_plan, HERE)
+    settled_at, weighed_later = 5, 0
+    for scan, stamp, counted in zip(
+        driven.scans, driven.odometry.stamps.tolist(), driven.odometry.poses, strict=True
+    ):
+        before = robot.localizer.belief
+        robot.send(Odometry(stamp, SE2.from_array(counted)))
+        views_before = len(before.window) if before else 0
+        is_settled = views_before >= settled_at
+        weighed_later += is_settled and robot.localizer.belief.window != before.window
+        window = robot.localizer.belief.window
+        assert of(TrackedPose, robot.send(scan))
+        if is_settled:
+            assert robot.localizer.belief.window == window
+    assert weighed_later >= 1
+
+
 # ---- scans and odometry meet by their stamps
 
 

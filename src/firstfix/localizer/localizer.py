@@ -69,6 +69,7 @@ class Localizer:
         self._rng = np.random.default_rng(self.config.amcl.seed)
         self._scans = ScanQueue(self.config.scans)
         self._view: View | None = None
+        self._unweighed: tuple[View, Tracked] | None = None
         self._lifted: set[SignalKind] = set()
         self._update_requested = False
         self._hint: Hint | None = None
@@ -136,6 +137,9 @@ class Localizer:
             If a new map cannot be searched. The state stays as it was.
         """
         check_input(given)
+        return [*self._weigh_in_background(), *self._process(given)]
+
+    def _process(self, given: Input) -> list[Output]:
         if isinstance(given, NewMap):
             return self._take_map(given)
         if isinstance(given, Odometry):
@@ -322,23 +326,30 @@ class Localizer:
         if not tracked.is_confirmed:
             reason = f"odometry has leapt, {tracked.fit_in_words}: waiting for a scan that fits"
             return [self._status(view.stamp, reason, place.evidence)]
-        revised = self._reconsider(view, tracked)
-        if revised:
+        if self._places.tracking_pace is Pace.BACKGROUND and self._is_settled(tracked):
+            self._unweighed = view, tracked  # the search takes longer than a scan: the pose first
+        elif revised := self._reconsider(view, tracked):
             return revised
         if self._chosen_by is None and place.evidence.explained >= LEAST_EXPLAINED:
             self._count_changes(view, tracked)
         reason = self._unless_chosen(tracked.fit_in_words)
         return [tracked.pose, self._status(view.stamp, reason, place.evidence)]
 
+    def _is_settled(self, tracked: Tracked) -> bool:
+        return self._chosen_by is None and tracked.judgement.fit is Fit.CONSISTENT
+
+    def _weigh_in_background(self) -> list[Output]:
+        """Reconsider the pose of the scan before, which was published at once."""
+        waiting, self._unweighed = self._unweighed, None
+        return [] if waiting is None else self._reconsider(*waiting)
+
     def _count_changes(self, view: View, tracked: Tracked) -> None:
         if self._changes is not None:
             self._changes.add(view.scans, tracked.pose.T_map_base, tracked.pose.covariance)
 
     def _reconsider(self, view: View, tracked: Tracked) -> list[Output]:
-        """Weigh all places in the background; return what changes if the pose was wrong."""
-        pace = self._places.tracking_pace
-        if self._chosen_by is not None or tracked.judgement.fit is not Fit.CONSISTENT:
-            pace = Pace.EVERY_VIEW
+        """Weigh all places; return what changes if the pose was wrong."""
+        pace = self._places.tracking_pace if self._is_settled(tracked) else Pace.EVERY_VIEW
         if not self._weigh(view, pace):
             return []
         T_map_base = tracked.pose.T_map_base
