@@ -20,7 +20,11 @@ ROOMS = {
 }
 
 
-def draw(boxes: list[tuple[float, float, float, float]], resolution: float = 0.05) -> OccupancyGrid:
+def draw(
+    boxes: list[tuple[float, float, float, float]],
+    resolution: float = 0.05,
+    frame: SE2 | None = None,
+) -> OccupancyGrid:
     """Draw a room with a margin of 0.5 m and walls of 0.2 m around it."""
 
     def span(low: float, high: float) -> slice:
@@ -31,7 +35,8 @@ def draw(boxes: list[tuple[float, float, float, float]], resolution: float = 0.0
     cells[span(0.0, 6.0), span(0.0, 8.0)] = FREE
     for x0, y0, x1, y1 in boxes:
         cells[span(y0, y1), span(x0, x1)] = OCCUPIED
-    return OccupancyGrid(cells, resolution, SE2(-0.7, -0.7, 0.0))
+    origin = SE2(-0.7, -0.7, 0.0)
+    return OccupancyGrid(cells, resolution, origin if frame is None else frame @ origin)
 
 
 def save_rooms(folder: Path) -> Path:

@@ -12,7 +12,7 @@ from firstfix.core.estimate import Evidence, LocateResult, SearchReport, Verdict
 # is a power of its mean cost: the ratio of two costs counts, not their difference. The exponent is
 # half the number of independent measurements in a scan, fewer if it has few beams; the floor is the
 # cost of sensor noise alone. docs/decisions/0005 has the measurements.
-_EXPONENT = 12.0
+EXPONENT = 12.0
 _BEAMS_FOR_EXPONENT = 30
 _FLOOR = 0.2
 
@@ -61,7 +61,7 @@ def with_prior(
     beams : int
         Number of beams behind each mean.
     """
-    exponent = _EXPONENT * min(1.0, beams / _BEAMS_FOR_EXPONENT)
+    exponent = EXPONENT * min(1.0, beams / _BEAMS_FOR_EXPONENT)
     costs: NDArray[np.float64] = (scores + _FLOOR) * np.exp(-logs / exponent) - _FLOOR
     return costs
 
@@ -81,7 +81,7 @@ def log_likelihoods(scores: NDArray[np.float64], beams: int) -> NDArray[np.float
     ndarray, shape (n,)
         Natural logarithms.
     """
-    exponent = _EXPONENT * min(1.0, beams / _BEAMS_FOR_EXPONENT)
+    exponent = EXPONENT * min(1.0, beams / _BEAMS_FOR_EXPONENT)
     logs: NDArray[np.float64] = -exponent * np.log(scores + _FLOOR)
     return logs
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from firstfix.core.scan import LaserScan
 from firstfix.global_localization.places import is_same_place
 from firstfix.global_localization.prior import NEAR_LOG
 from firstfix.global_localization.sensors import joint_beams, see_enough
-from firstfix.global_localization.verdict import RIVAL_SHARE, judge, place_probabilities
+from firstfix.global_localization.verdict import EXPONENT, RIVAL_SHARE, judge, place_probabilities
 from firstfix.site.look import Looked
 from firstfix.site.places import SiteCandidates, SitePlace
 from firstfix.site.query import SiteQuery
@@ -31,6 +32,11 @@ from firstfix.site.views import has_moved, views_of
 # Least probability for UNIQUE: of one look as in `LocateConfig`, of several views as in the belief.
 UNIQUE_PROBABILITY = 0.95
 SURE_PROBABILITY = BeliefConfig().sure_probability
+
+# One look decides between maps by the power law of the verdict on the best cost of each, with this
+# exponent, and within a map by the law itself, whose exponent is 12: places of one map share its
+# errors, those of another do not. So no place is surer than in its map alone (0021).
+MAP_EXPONENT = 16.0
 
 LISTED_PLACES = 24
 
@@ -77,21 +83,24 @@ def judge_site(
     if not places:
         searched = any(part.searched for part in found)
         return _result(query, seen, found, Verdict.NO_MATCH, _NOTHING if searched else _NO_MAP)
-    shares = seen.recall * _shares(places, copies, found)
+    if query.is_one_look:
+        shares = seen.recall * _shares_of_look(places)[:, None]
+    else:
+        shares = seen.recall * _shares_of_views(places, copies, found)
+    order = np.argsort(-shares[:, -1], kind="stable").tolist()
+    places, copies, shares = [places[i] for i in order], [copies[i] for i in order], shares[order]
     hypotheses = [
         replace(place.hypothesis, probability=float(share))
         for place, share in zip(places, shares[:, -1], strict=True)
     ]
-    if query.is_one_look:
-        verdict, reason = _judge_look(query, places, shares[:, -1])
-    else:
-        verdict, reason = _judge_views(query, places, shares)
+    judged = _judge_look if query.is_one_look else _judge_views
+    verdict, reason = judged(query, places, shares)
     if verdict is Verdict.UNIQUE:
         verdict, reason = _checked_against_prior(places, reason)
     return replace(
         _result(query, seen, found, verdict, reason),
         hypotheses=tuple(hypotheses[:LISTED_PLACES]),
-        same_places=copies,
+        same_places=tuple(map(tuple, copies[:LISTED_PLACES])),
         map_probabilities={
             name: sum(h.probability for h in hypotheses if h.map_id == name)
             for name in seen.map_ids
@@ -100,9 +109,34 @@ def judge_site(
     )
 
 
-def _shares(
+def _shares_of_look(places: Sequence[SitePlace]) -> NDArray[np.float64]:
+    """Return the probability of each place after one look, shape (n,): of its map, and in it."""
+    ratio = MAP_EXPONENT / EXPONENT
+    names = [place.map_id for place in places]
+    inside = {
+        name: _normalised([p.log_posterior for p in places if p.map_id == name])
+        for name in dict.fromkeys(names)
+    }
+    best = {
+        name: max(ratio * p.log_likelihood + p.prior_log for p in places if p.map_id == name)
+        for name in inside
+    }
+    of_maps = dict(zip(best, _normalised([*best.values()]), strict=True))
+    rest = {name: iter(shares) for name, shares in inside.items()}
+    return np.array([of_maps[name] * next(rest[name]) for name in names])
+
+
+def _normalised(logs: Sequence[float]) -> NDArray[np.float64]:
+    """Turn log-likelihoods into probabilities; a wrong map has 0, and the rest to 1."""
+    all_logs = np.array([0.0, *logs])
+    likelihoods = np.exp(all_logs - all_logs.max())
+    shares: NDArray[np.float64] = likelihoods[1:] / likelihoods.sum()
+    return shares
+
+
+def _shares_of_views(
     places: Sequence[SitePlace],
-    copies: dict[int, list[SitePlace]],
+    copies: Sequence[Sequence[SitePlace]],
     found: Sequence[SiteCandidates],
 ) -> NDArray[np.float64]:
     """Return the probability of each place after each view, shape (n, steps).
@@ -113,8 +147,8 @@ def _shares(
     totals = np.array([part.totals for part in found if len(part.totals)])
     most = np.maximum(0.0, np.maximum(logs.max(axis=0), totals.max(axis=0)))
     mass = np.exp(-most) + np.exp(totals - most).sum(axis=0)
-    for others in copies.values():
-        mass -= np.exp(np.array([other.steps for other in others]) - most).sum(axis=0)
+    for other in chain.from_iterable(copies):
+        mass -= np.exp(np.array(other.steps) - most)
     likelihoods = np.exp(logs - most)
     # Where nearly all was copies, what is left of the mass is rounding.
     shares: NDArray[np.float64] = likelihoods / np.maximum(mass, likelihoods.sum(axis=0))
@@ -124,7 +158,7 @@ def _shares(
 def _judge_look(
     query: SiteQuery, places: Sequence[SitePlace], shares: NDArray[np.float64]
 ) -> tuple[Verdict, str]:
-    verdict, reason = judge(shares, places[0].hypothesis.evidence, UNIQUE_PROBABILITY)
+    verdict, reason = judge(shares[:, -1], places[0].hypothesis.evidence, UNIQUE_PROBABILITY)
     is_enough = see_enough(query.scans) or _is_hinted(query, places[0])
     if verdict is Verdict.UNIQUE and not is_enough:
         return Verdict.AMBIGUOUS, f"{reason}, {_SEES_TOO_LITTLE}"
@@ -180,17 +214,18 @@ def _checked_against_prior(places: Sequence[SitePlace], reason: str) -> tuple[Ve
 
 def _without_copies(
     ranked: Sequence[SitePlace],
-) -> tuple[list[SitePlace], dict[int, list[SitePlace]]]:
-    """Keep the best of places that are one; return the others by its rank."""
+) -> tuple[list[SitePlace], list[list[SitePlace]]]:
+    """Keep the best of places that are one, and return the others of each."""
     kept: list[SitePlace] = []
-    copies: dict[int, list[SitePlace]] = {}
+    copies: list[list[SitePlace]] = []
     for place in ranked:
-        for rank, better in enumerate(kept):
+        for better, others in zip(kept, copies, strict=True):
             if are_one_place(better, place):
-                copies.setdefault(rank, []).append(place)
+                others.append(place)
                 break
         else:
             kept.append(place)
+            copies.append([])
     return kept, copies
 
 
@@ -225,7 +260,7 @@ def _result(
         verdict=verdict,
         reason=reason,
         hypotheses=(),
-        same_places={},
+        same_places=(),
         map_probabilities=dict.fromkeys(seen.map_ids, 0.0),
         elsewhere=1.0,
         searched=tuple(name for part in found for name in part.searched),

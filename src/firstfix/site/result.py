@@ -31,8 +31,8 @@ class SiteResult:
         The verdict in words.
     hypotheses : tuple of Hypothesis
         Separate places of all maps, most likely first, each with its ``map_id``.
-    same_places : dict of int to list of SitePlace
-        By rank of a hypothesis: the same place in other maps that overlap or are copies.
+    same_places : tuple of tuple of SitePlace
+        For each hypothesis the same place in other maps, which overlap or are copies.
     map_probabilities : dict of str to float
         Of each map of the site.
     elsewhere : float
@@ -61,7 +61,7 @@ class SiteResult:
     verdict: Verdict
     reason: str
     hypotheses: tuple[Hypothesis, ...]
-    same_places: dict[int, list[SitePlace]]
+    same_places: tuple[tuple[SitePlace, ...], ...]
     map_probabilities: dict[str, float]
     elsewhere: float
     searched: tuple[str, ...]
@@ -97,10 +97,9 @@ class SiteResult:
             Number of the scan in its recording.
         """
         places = []
-        for rank, hypothesis in enumerate(self.hypotheses):
+        for hypothesis, others in zip(self.hypotheses, self.same_places, strict=True):
             same = [
-                {"map_id": other.map_id, "pose": list(other.hypothesis.pose)}
-                for other in self.same_places.get(rank, [])
+                {"map_id": other.map_id, "pose": list(other.hypothesis.pose)} for other in others
             ]
             places.append({"map_id": hypothesis.map_id, **hypothesis.to_dict(), "also": same})
         return {

@@ -28,7 +28,7 @@ from firstfix.site.query import SiteQuery
 # all beams are compared; those that are refined on rays and listed.
 MAP_PLACES = 150
 POOL_PLACES = 1000
-CAREFUL_PLACES = 64
+CAREFUL_PLACES = 128
 LISTED_PLACES = 24
 FIRST_BEAMS = 60
 
