@@ -113,13 +113,14 @@ def build_look_table(
     """
     standing = seen_free & (clearance > max(1, round(_KEPT_M / resolution)))
     rows, columns, samples = _label(standing, stride, max(1.0, _LEAST_SHARE * stride**2))
-    n = len(rows)
     directions = _BETWEEN * LOOK_DIRECTIONS
-    low = np.full((n, LOOK_DIRECTIONS), FARTHEST, np.uint8)
-    high = np.zeros((n, LOOK_DIRECTIONS), np.uint8)
+    near = np.empty((directions, len(rows)), np.uint8)
+    away = np.empty((directions, len(rows)), np.uint8)
     for upright in (True, False):
-        cells = occupied if upright else np.ascontiguousarray(occupied.T)
-        bands = _bands(rows if upright else columns, samples, stride, upright=upright)
+        walls = np.ascontiguousarray(occupied if upright else occupied.T)
+        free = np.pad(~walls, 1, constant_values=True).view(np.uint8)
+        starts, order, places = _bands(rows if upright else columns, samples, stride, upright)
+        found = np.empty((2, len(rows)), np.uint8)
         for i in range(directions):
             angle = i * (FULL_TURN / directions)
             along, across = math.sin(angle), math.cos(angle)
@@ -127,39 +128,33 @@ def build_look_table(
                 continue
             if not upright:
                 along, across = across, along
-            offsets = np.floor(np.arange(len(cells)) * (across / along) + 0.5).astype(np.int64)
+            offsets = np.floor(np.arange(len(walls)) * (across / along) + 0.5).astype(np.int64)
             far = np.uint16(math.ceil(REACH_M / resolution * abs(along)) + 1)
             scale = resolution / abs(along) / UNIT_M
-            _sweep(
-                cells,
-                offsets,
-                -1 if along > 0.0 else 1,
-                far,
-                stride,
-                *bands,
-                scale,
-                _covered(i),
-                low,
-                high,
-            )
-    return LookTable(stride, rows, columns, np.stack([low, high], axis=1))
-
-
-def _covered(i: int) -> NDArray[np.int64]:
-    """Return the directions of the table that a direction of the sweeps belongs to."""
-    nearest = i // _BETWEEN
-    both = [nearest] if i % _BETWEEN == 0 else [nearest, nearest + 1]
-    return np.array(both) % LOOK_DIRECTIONS
+            step = -1 if along > 0.0 else 1
+            _sweep(free, offsets, step, far, stride, starts, places, scale, found)
+            near[i, order], away[i, order] = found
+    # A direction of the table covers the sweeps halfway to its neighbours.
+    every = np.arange(0, directions, _BETWEEN)
+    covered = [every, every - 1, (every + 1) % directions]
+    low = np.minimum.reduce([near[i] for i in covered])
+    high = np.maximum.reduce([away[i] for i in covered])
+    return LookTable(stride, rows, columns, np.ascontiguousarray(np.stack([low.T, high.T], axis=1)))
 
 
 def _bands(
-    blocks: NDArray[np.int32], samples: NDArray[np.int32], stride: int, *, upright: bool
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32], NDArray[np.int32]]:
-    """Sort entries by rows of blocks: first entry of each row, order, and samples (row, column)."""
+    blocks: NDArray[np.int32],
+    samples: NDArray[np.int32],
+    stride: int,
+    upright: bool,  # noqa: FBT001 - no option: the map lies or stands
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.uint32]]:
+    """Sort entries by rows of blocks: the first of each row, the order, and samples (2, n, 16)."""
     order = np.argsort(blocks, kind="stable")
     starts = np.searchsorted(blocks[order], np.arange(int(blocks.max(initial=0)) + 2))
     row, column = (samples[0], samples[1]) if upright else (samples[1], samples[0])
-    return starts, order, row % np.int32(stride), column
+    # Unsigned, as in the kernels.
+    places = np.stack([row[order] % np.int32(stride), column[order]]).astype(np.uint32)
+    return starts, order, places
 
 
 @kernel
@@ -247,74 +242,61 @@ def _choose_samples(
 
 @kernel
 def _sweep(  # noqa: PLR0913 - a kernel takes its arrays one by one
-    cells: NDArray[np.bool_],
+    free: NDArray[np.uint8],
     offsets: NDArray[np.int64],
     step: int,
     far: np.uint16,
     stride: int,
     starts: NDArray[np.int64],
-    order: NDArray[np.int64],
-    sample_rows: NDArray[np.int32],
-    sample_columns: NDArray[np.int32],
+    places: NDArray[np.uint32],
     scale: float,
-    covered: NDArray[np.int64],
-    low: NDArray[np.uint8],
-    high: NDArray[np.uint8],
+    found: NDArray[np.uint8],
 ) -> None:
     """Count the rows to the wall along one direction, from its far end, a band of blocks at a time.
 
-    ``step`` leads from the far end to the sensor; ``offsets`` is the digital line: its column in
-    every row. The bounds of the directions that are
-    covered are widened by the ranges of the samples.
+    ``free`` has a margin of one cell. ``step`` leads from the far end to the sensor; ``offsets`` is
+    the digital line: its column in every row. The shortest and longest ranges of the samples of
+    each entry are written to ``found``.
     """
-    height, width = cells.shape
+    height, width = free.shape[0] - 2, free.shape[1] - 2
     band = np.empty((stride, width), np.uint16)
-    after = np.full(3 * width + 2, far, np.uint16)  # the row before in this sweep, with margins
-    one, none = np.uint16(1), np.uint16(0)
+    after = np.full(width + 2, far, np.uint16)  # the row before in this sweep
+    one = np.uint16(1)
     for i in range(height):
         r = i if step > 0 else height - 1 - i
-        shift = offsets[r - step] - offsets[r] if i > 0 else 0
-        shift = min(max(shift, -width), width)
-        row, wall = band[r % stride], cells[r]
-        ahead = after[width + shift : 2 * width + shift]
-        for c in range(width):
-            row[c] = none if wall[c] else min(np.uint16(ahead[c] + one), far)
-        if shift != 0:
+        shift = 1 + (offsets[r - step] - offsets[r] if i > 0 else 0)
+        row, here = band[r % stride], free[r + 1, 1:]
+        ahead, beside, diagonal = after[shift:], free[r + 1 - step, 1:], free[r + 1, shift:]
+        # Unsigned indices cannot count from the end of an array: LLVM can vectorise the loop.
+        for c in range(np.uint64(width)):
             # Between two walls that touch at a corner only, a line does not pass.
-            beside = after[width : 2 * width]
-            for c in range(max(0, -shift), min(width, width - shift)):
-                if beside[c] == 0 and wall[c + shift] and not wall[c]:
-                    row[c] = one
-        for c in range(width):
-            after[width + c] = row[c]
+            passes = np.uint16(beside[c] | diagonal[c])
+            count = min(np.uint16(np.uint16(ahead[c] * passes) + one), far)
+            row[c] = np.uint16(count * here[c])
+        for c in range(np.uint64(width)):
+            after[c + np.uint64(1)] = row[c]
         block = r // stride
         is_whole = i == height - 1 or (r + step) // stride != block
         if is_whole and block + 1 < starts.shape[0]:
-            here = order[starts[block] : starts[block + 1]]
-            _widen(band, here, sample_rows, sample_columns, scale, covered, low, high)
+            _find_bounds(band, places, starts[block], starts[block + 1], scale, found)
 
 
 @kernel
-def _widen(  # noqa: PLR0913 - a kernel takes its arrays one by one
+def _find_bounds(
     band: NDArray[np.uint16],
-    entries: NDArray[np.int64],
-    sample_rows: NDArray[np.int32],
-    sample_columns: NDArray[np.int32],
+    places: NDArray[np.uint32],
+    first: int,
+    end: int,
     scale: float,
-    covered: NDArray[np.int64],
-    low: NDArray[np.uint8],
-    high: NDArray[np.uint8],
+    found: NDArray[np.uint8],
 ) -> None:
+    """Write the shortest and longest range of the samples of some entries, counts."""
     farthest = np.float64(FARTHEST)
-    for e in range(entries.shape[0]):
-        k = entries[e]
+    for k in range(first, end):
         shortest, longest = np.uint16(65535), np.uint16(0)
-        for j in range(sample_rows.shape[1]):
-            count = band[sample_rows[k, j], sample_columns[k, j]]
+        for j in range(places.shape[2]):
+            count = band[places[0, k, j], places[1, k, j]]
             shortest, longest = min(shortest, count), max(longest, count)
         # A wall begins half a step before the middle of its cell.
-        near = np.uint8(min(farthest, max(0.0, (shortest - 0.5) * scale) + 0.5))
-        away = np.uint8(min(farthest, max(0.0, (longest - 0.5) * scale) + 0.5))
-        for d in range(covered.shape[0]):
-            low[k, covered[d]] = min(low[k, covered[d]], near)
-            high[k, covered[d]] = max(high[k, covered[d]], away)
+        found[0, k] = np.uint8(min(farthest, max(0.0, (shortest - 0.5) * scale) + 0.5))
+        found[1, k] = np.uint8(min(farthest, max(0.0, (longest - 0.5) * scale) + 0.5))

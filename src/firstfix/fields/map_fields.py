@@ -31,7 +31,7 @@ from firstfix.fields.search_grid import (
 NEAR_M = 1.0
 
 # Of the arrays in the folder of fields.
-_VERSION = "fields 2"
+_VERSION = "fields 3"
 _SETTINGS = repr((SPACING_M, BLOCKS, DIRECTIONS, UNIT_M, REACH_M, NEAR_M, MAX_LIMIT))
 
 
