@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "robots"))  # site_lab, requi
 from fleet_lab import FleetServer
 from site_lab import ROOMS, draw, save_rooms
 
+from firstfix.cli.app import run
 from firstfix.io.maps.map_server import save_map
 
 
@@ -41,3 +43,21 @@ def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Fl
     for server in started:
         if server.process.poll() is None:
             server.stop()
+
+
+@pytest.fixture
+def cli(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str]]:
+    """Run a command line in this process; give its status and what it wrote to stderr."""
+
+    def call(*arguments: object) -> tuple[int, str]:
+        status = run([str(argument) for argument in arguments])
+        return status, capsys.readouterr().err
+
+    return call
+
+
+@pytest.fixture
+def free_port() -> int:
+    """Give a port that nothing listens on."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        return int(listening.getsockname()[1])

@@ -18,11 +18,10 @@ from firstfix.site.result import SiteResult
 
 T = TypeVar("T")
 
-TRIALS = 4
-"""How often a job is given to a worker that is lost each time."""
-
-_FIRST_PAUSE_S = 0.2
-"""Before the second trial; doubled each time."""
+PAUSES_S = (0.0, 0.2, 1.0, 3.0, 8.0)
+"""Before each trial of a job whose worker was lost. A process is back within seconds; a Ray cluster
+needs about ten to notice that a node is lost. A job that ends each worker ends no more than these.
+"""
 
 
 class UnknownMapError(InputError):
@@ -43,6 +42,14 @@ class Fleet:
         Runs the workers.
     shards : tuple of tuple of str
         Ids of the maps of each worker.
+    prepared : set of str
+        Maps that can be searched.
+    faults : dict of str to str
+        A sentence for each map that cannot.
+    memory : dict of int to int
+        What each worker used when it last answered, bytes.
+    lost_jobs : int
+        Jobs that were lost with their worker.
     """
 
     engine: Engine
@@ -50,7 +57,7 @@ class Fleet:
     prepared: set[str] = field(default_factory=set)
     faults: dict[str, str] = field(default_factory=dict)
     memory: dict[int, int] = field(default_factory=dict)
-    lost_workers: int = 0
+    lost_jobs: int = 0
 
     @property
     def map_ids(self) -> tuple[str, ...]:
@@ -148,15 +155,12 @@ class Fleet:
         return list(await asyncio.gather(*(self._ask(worker, job) for worker, job in asked)))
 
     async def _ask(self, worker: int, job: Job[T]) -> T:
-        pause = _FIRST_PAUSE_S
-        for trial in range(TRIALS):
-            if trial:
-                await asyncio.sleep(pause)
-                pause *= 2
+        for pause in PAUSES_S:
+            await asyncio.sleep(pause)
             try:
                 done = await self.engine.ask(worker, job)
             except WorkerLostError:
-                self.lost_workers += 1
+                self.lost_jobs += 1
                 continue
             self.memory[worker] = done.memory
             return done.result

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 
 from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
-from prometheus_client.core import GaugeMetricFamily
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.process_collector import ProcessCollector
 from prometheus_client.registry import Collector
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -23,8 +23,8 @@ class Metrics:
     ----------
     app : ASGI application
         What is counted.
-    service : Service
-        What is described.
+    registry : CollectorRegistry
+        Where the figures are kept.
     """
 
     def __init__(self, app: ASGIApp, registry: CollectorRegistry) -> None:
@@ -80,7 +80,7 @@ class _ServiceCollector(Collector):
     def __init__(self, service: Service) -> None:
         self._service = service
 
-    def collect(self) -> Iterator[GaugeMetricFamily]:
+    def collect(self) -> Iterator[Metric]:
         """Return all figures."""
         service, fleet = self._service, self._service.fleet
         maps = GaugeMetricFamily("firstfix_maps", "Maps by state.", labels=["state"])
@@ -89,7 +89,7 @@ class _ServiceCollector(Collector):
         for state, number in counted.items():
             maps.add_metric([state], number)
         yield maps
-        verdicts = GaugeMetricFamily("firstfix_verdicts_total", "Verdicts.", labels=["verdict"])
+        verdicts = CounterMetricFamily("firstfix_verdicts", "Verdicts.", labels=["verdict"])
         for verdict, number in service.verdicts.items():
             verdicts.add_metric([verdict], number)
         yield verdicts
@@ -104,6 +104,8 @@ class _ServiceCollector(Collector):
         for name, text, value in (
             ("firstfix_queue", "Queries that run or wait.", service.waiting),
             ("firstfix_robots", "Robots that are remembered.", len(service.sessions)),
-            ("firstfix_lost_workers_total", "Answers of lost workers.", fleet.lost_workers),
         ):
             yield GaugeMetricFamily(name, text, value=value)
+        yield CounterMetricFamily(
+            "firstfix_lost_jobs", "Jobs that were lost with their worker.", value=fleet.lost_jobs
+        )

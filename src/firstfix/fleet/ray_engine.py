@@ -48,7 +48,8 @@ class RayEngine:
     sharded : ShardedSite
         The maps of each worker, at the same path on all nodes.
     address : str or None
-        Of a running cluster; None starts one on this machine.
+        Of a running cluster; None takes the one that this process belongs to, or else starts one
+        on this machine.
 
     Raises
     ------
@@ -57,7 +58,9 @@ class RayEngine:
     """
 
     def __init__(self, sharded: ShardedSite, address: str | None) -> None:
-        _connect(address, len(sharded.shards))
+        self._is_guest = ray.is_initialized()
+        if not self._is_guest:
+            _connect(address, len(sharded.shards))
         actor = ray.remote(num_cpus=1, max_restarts=-1, scheduling_strategy="SPREAD")(ShardActor)
         self._actors = [actor.remote(sharded, i) for i in range(len(sharded.shards))]
 
@@ -74,11 +77,12 @@ class RayEngine:
         return done
 
     def close(self) -> None:
-        """End all actors, and the cluster if it was started here."""
+        """End all actors, and leave the cluster, or end it if it was started here."""
         for actor in self._actors:
             ray.kill(actor)
         self._actors = []
-        ray.shutdown()
+        if not self._is_guest:
+            ray.shutdown()
 
 
 def _connect(address: str | None, workers: int) -> None:
