@@ -14,7 +14,7 @@ from firstfix.belief.enter import propose
 from firstfix.belief.evidence import WRONG_MAP_COST, shares
 from firstfix.belief.hints import Hint, Source, hint_logs
 from firstfix.belief.joint import joint_log_likelihoods, power_of
-from firstfix.belief.judge import Judgement, Rule, judge
+from firstfix.belief.judge import ALONE_PROBABILITY, Judgement, Rule, judge
 from firstfix.belief.merge import merge
 from firstfix.belief.place import listed_places
 from firstfix.belief.planar import between, compose, in_cells, to_map
@@ -26,7 +26,9 @@ from firstfix.core.estimate import Hypothesis, SearchReport, Verdict
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS
+from firstfix.global_localization.places import distinct_places
 from firstfix.global_localization.prior import Prior
+from firstfix.global_localization.verdict import place_probabilities
 
 # A view brings news where the robot has moved or turned by this much.
 NEWS_M = 0.3
@@ -282,7 +284,7 @@ def update(belief: Belief, view: View) -> Belief:
         judgement=judgement,
         search=search,
         next_id=belief.next_id + len(entering),
-        misses=belief.misses + 1 if _missed(judgement, tracks, entering) else 0,
+        misses=_misses(belief.misses, judgement, tracks, entering, window),
     )
 
 
@@ -380,9 +382,28 @@ def _share_without_priors(
     return float(weights[0] / (weights.sum() + elsewhere))
 
 
-def _missed(judgement: Judgement, tracks: Tracks, entering: Tracks) -> bool:
-    """Tell whether the best place does not explain the newest view, though others do."""
+def _misses(
+    before: int,
+    judgement: Judgement,
+    tracks: Tracks,
+    entering: Tracks,
+    window: tuple[Observation, ...],
+) -> int:
+    """Count the views in a row that the best place does not explain, though others do."""
     if not judgement.unexplained or len(entering) == 0:
-        return False
+        return 0
     best = float(tracks.costs[0, -1]) if len(tracks) else WRONG_MAP_COST
-    return float(entering.costs.min()) < 0.5 * best
+    costs = entering.costs[:, 0]
+    if costs.min() >= 0.5 * best:
+        return 0
+    # One look of a sensor that sees much is enough to know that what was seen before misleads.
+    return MOST_MISSES if _is_decisive(entering, window[-1]) else before + 1
+
+
+def _is_decisive(entering: Tracks, seen: Observation) -> bool:
+    """Tell whether the newest view alone would have decided for one of the places it proposes."""
+    if not seen.decides_alone:
+        return False
+    costs = entering.costs[:, 0]
+    places = distinct_places(entering.now, costs, seen.resolution, CAREFUL_PLACES)
+    return float(place_probabilities(costs[places], len(seen.beams))[0]) >= ALONE_PROBABILITY
