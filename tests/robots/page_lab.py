@@ -185,7 +185,7 @@ class Visit:
 
     def wait_for_map(self) -> None:
         """Wait until there is something to see."""
-        self.page.wait_for_selector("#app[data-map]")
+        self.page.wait_for_selector("#app[data-map]", timeout=1000.0 * PATIENCE_S)
         wait_until(lambda: self.data("view"), lambda: "a frame was drawn")
 
     def events(self) -> list[str]:

@@ -164,6 +164,29 @@ def test_axe_finds_no_serious_violation(
     assert faults == []
 
 
+@pytest.mark.parametrize(
+    ("device", "scheme"), [(DESKTOP, "dark"), (PHONE, "light")], ids=["desktop-dark", "phone-light"]
+)
+def test_axe_finds_no_serious_violation_in_tour_past_and_files(
+    visit: Visitor, office_server: Server, device: dict, scheme: str, tmp_path: Path
+) -> None:
+    page = visit(office_server.url, device, color_scheme=scheme, bypass_csp=True)
+    page.wait_for_fix()
+    page.page.keyboard.press("t")
+    faults = serious_faults(page)
+    page.page.keyboard.press("Escape")
+    (tmp_path / "map.yaml").write_text("image: map.pgm")
+    page.page.set_input_files("#files", str(tmp_path / "map.yaml"))
+    page.page.wait_for_selector("#dropped", state="visible")
+    faults += serious_faults(page)
+    page.page.click("#file-leave")
+    wait_until(lambda: not page.page.is_disabled("#scrub"), lambda: "moments are kept")
+    page.page.keyboard.press(",")
+    page.page.wait_for_selector("#past", state="visible")
+    faults += serious_faults(page)
+    assert faults == []
+
+
 def serious_faults(page: Visit) -> list[str]:
     """Return the serious violations that axe-core finds."""
     from axe_playwright_python.sync_playwright import Axe

@@ -20,8 +20,6 @@ from firstfix.lab.worlds.catalog import WORLDS
 pytestmark = pytest.mark.slow
 
 Visitor = Callable[..., Visit]
-SCHEMES = pytest.mark.parametrize("scheme", ["light", "dark"])
-DEVICES = pytest.mark.parametrize("device", [DESKTOP, PHONE], ids=["desktop", "phone"])
 
 
 def luminance(colour: str) -> float:
@@ -53,8 +51,9 @@ def large_server(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Ite
     server.stop()
 
 
-@SCHEMES
-@DEVICES
+@pytest.mark.parametrize(
+    ("device", "scheme"), [(DESKTOP, "light"), (PHONE, "dark")], ids=["desktop-light", "phone-dark"]
+)
 def test_walls_of_one_cell_are_seen_at_every_scale(
     visit: Visitor, large_server: Server, device: dict, scheme: str, tmp_path: Path
 ) -> None:

@@ -103,8 +103,10 @@ def _run_scenario(grid: OccupancyGrid, world: str, seed: int, plot: Path) -> Non
     typer.echo(f"Picture    {picture}")
     program = "firstfix" if shutil.which("firstfix") else f"{Path(sys.executable).name} -m firstfix"
     typer.echo(f"Live page  run `{program} demo` and open the address that it prints")
-    typer.echo(f"Result     {_result_text(episodes)}")
-    if not all(episode.is_tracked or episode.is_correctly_ambiguous for episode in episodes):
+    succeeded = all(episode.is_tracked or episode.is_correctly_ambiguous for episode in episodes)
+    colour = typer.colors.GREEN if succeeded else typer.colors.RED
+    typer.echo(f"Result     {typer.style(_result_text(episodes), fg=colour, bold=True)}")
+    if not succeeded:
         raise typer.Exit(FAILED)
 
 
