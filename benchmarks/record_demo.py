@@ -160,6 +160,7 @@ def record(address: str) -> list[tuple[float, Image.Image]]:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_path, args=["--no-sandbox"])
         page = browser.new_page(viewport=WINDOW, color_scheme="light")
+        page.add_init_script("localStorage.setItem('firstfix-tour', 'seen')")  # not offered here
         page.goto(address)
         page.wait_for_selector("#app[data-view]")
         page.evaluate(STAGE)
