@@ -29,17 +29,26 @@ if TYPE_CHECKING:
     from firstfix.lab.scenarios.example_drive import simulate_drive
     from firstfix.lab.simulation.lidar import Lidar
     from firstfix.localizer.config import ChangesConfig, LocalizerConfig, MonitorConfig, ScansConfig
-    from firstfix.localizer.inputs import NewMap, NoMotionUpdate, PoseHint, PositionFix, Reset
+    from firstfix.localizer.inputs import (
+        MapHint,
+        NewMap,
+        NoMotionUpdate,
+        PoseHint,
+        PositionFix,
+        Reset,
+    )
     from firstfix.localizer.localizer import Localizer
     from firstfix.localizer.outputs import (
         Hypotheses,
         InitialPose,
+        MapSwitched,
         MotionRequest,
         Status,
         TrackedPose,
     )
     from firstfix.localizer.precompile import precompile
     from firstfix.localizer.states import Event, State
+    from firstfix.site.floors import SiteLocalizer
     from firstfix.site.result import SiteResult
     from firstfix.site.site import Site
 
@@ -68,6 +77,8 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "LocateResult",
     "MapChanges",
     "MapError",
+    "MapHint",
+    "MapSwitched",
     "Method",
     "MonitorConfig",
     "MotionModel",
@@ -92,6 +103,7 @@ __all__ = [  # noqa: RUF022 - in plain alphabetical order
     "Signal",
     "SignalKind",
     "Site",
+    "SiteLocalizer",
     "SiteResult",
     "State",
     "Status",
@@ -137,12 +149,20 @@ _MODULES = {
     "lab.scenarios.example_drive": ("simulate_drive",),
     "lab.simulation.lidar": ("Lidar",),
     "localizer.config": ("ChangesConfig", "LocalizerConfig", "MonitorConfig", "ScansConfig"),
-    "localizer.inputs": ("NewMap", "NoMotionUpdate", "PoseHint", "PositionFix", "Reset"),
+    "localizer.inputs": ("MapHint", "NewMap", "NoMotionUpdate", "PoseHint", "PositionFix", "Reset"),
     "localizer.localizer": ("Localizer",),
-    "localizer.outputs": ("Hypotheses", "InitialPose", "MotionRequest", "Status", "TrackedPose"),
+    "localizer.outputs": (
+        "Hypotheses",
+        "InitialPose",
+        "MapSwitched",
+        "MotionRequest",
+        "Status",
+        "TrackedPose",
+    ),
     "localizer.precompile": ("precompile",),
     "localizer.states": ("Event", "State"),
     "site.result": ("SiteResult",),
+    "site.floors": ("SiteLocalizer",),
     "site.site": ("Site",),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}

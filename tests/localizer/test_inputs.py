@@ -10,12 +10,20 @@ import pytest
 from firstfix.core.odometry import Odometry, Signal
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.localizer.inputs import Input, NewMap, NoMotionUpdate, PoseHint, PositionFix, Reset
+from firstfix.localizer.inputs import (
+    Input,
+    MapHint,
+    NewMap,
+    NoMotionUpdate,
+    PoseHint,
+    PositionFix,
+    Reset,
+)
 
 
 def test_every_input_has_a_stamp_of_its_own() -> None:
     kinds = get_args(Input)
-    requests = {PoseHint, PositionFix, Reset, NoMotionUpdate}
+    requests = {MapHint, PoseHint, PositionFix, Reset, NoMotionUpdate}
     assert set(kinds) == {NewMap, LaserScan, Odometry, Signal} | requests
     for kind in kinds:
         (stamp,) = (field for field in dataclasses.fields(kind) if field.name == "stamp")

@@ -74,6 +74,8 @@ class ScanMatcher:
     cache_dir : Path, optional
         Folder of prepared maps, such as `firstfix.fields.cache.cache_folder`; by default the map is
         prepared anew.
+    fields : MapFields, optional
+        The map with its fields, where another part of the program has them.
 
     Raises
     ------
@@ -99,11 +101,12 @@ class ScanMatcher:
         method: Method | str = Method.FAST,
         config: LocateConfig | None = None,
         cache_dir: Path | None = None,
+        fields: MapFields | None = None,
     ) -> None:
         check_searchable(as_instance(OccupancyGrid, grid, "grid"))
         self.method = as_member(Method, method, "method")
         self.config = as_instance(LocateConfig, config or LocateConfig(), "config")
-        self.fields = MapFields(grid, cache_dir)
+        self.fields = MapFields(grid, cache_dir) if fields is None else fields
         self._exhaustive: ExhaustiveSearch | None = None
         if self.method is Method.FAST:
             check_positions(self.fields)

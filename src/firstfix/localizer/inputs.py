@@ -14,6 +14,7 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Odometry, Signal
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.prior import Prior
 
 
@@ -29,6 +30,8 @@ class NewMap:
         The map.
     map_id : str
         Its name, such as that of a floor. The localizer does not use it; nodes publish it.
+    fields : MapFields or None
+        The map with its fields, where it has been prepared.
 
     Examples
     --------
@@ -40,6 +43,7 @@ class NewMap:
     stamp: float
     grid: OccupancyGrid
     map_id: str = ""
+    fields: MapFields | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         as_instance(OccupancyGrid, self.grid, "grid")
@@ -151,7 +155,44 @@ class NoMotionUpdate:
     stamp: float
 
 
-Input = NewMap | LaserScan | Odometry | Signal | PoseHint | PositionFix | Reset | NoMotionUpdate
+@dataclass(frozen=True, slots=True)
+class MapHint:
+    """The map in which the robot is said to be, such as by a lift; the scans verify it.
+
+    Only a `SiteLocalizer` has several maps.
+
+    Parameters
+    ----------
+    stamp : float
+        Time, s.
+    map_id : str
+        The map.
+    source : str
+        Where it comes from, in the words that people will read.
+
+    Examples
+    --------
+    >>> hint = ff.MapHint(12.0, "first", source="the lift")
+    >>> ff.Localizer().handle(hint)[0].state
+    <State.NO_MAP: 'NO_MAP'>
+    """
+
+    stamp: float
+    map_id: str
+    source: str = "a person"
+
+
+Input = (
+    NewMap
+    | LaserScan
+    | Odometry
+    | Signal
+    | PoseHint
+    | PositionFix
+    | Reset
+    | NoMotionUpdate
+    | MapHint
+)
 
 
 def check_input(given: object) -> None:
@@ -159,7 +200,7 @@ def check_input(given: object) -> None:
     if not isinstance(given, Input):
         raise InputError(
             expected="an input: NewMap, LaserScan, Odometry, Signal, PoseHint, PositionFix, "
-            "Reset or NoMotionUpdate",
+            "Reset, NoMotionUpdate or MapHint",
             received=type(given).__name__,
             remedy="wrap it, such as ff.NewMap(stamp, grid) for a map",
         )

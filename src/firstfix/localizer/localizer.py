@@ -23,7 +23,15 @@ from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.deciding_motion import advise
 from firstfix.localizer.hint import Hint, read_hint
-from firstfix.localizer.inputs import Input, NewMap, PoseHint, PositionFix, Reset, check_input
+from firstfix.localizer.inputs import (
+    Input,
+    MapHint,
+    NewMap,
+    PoseHint,
+    PositionFix,
+    Reset,
+    check_input,
+)
 from firstfix.localizer.outputs import Hypotheses, InitialPose, Output, Status
 from firstfix.localizer.place_belief import Pace, PlaceBelief, Support
 from firstfix.localizer.pose_monitor import Fit
@@ -158,13 +166,21 @@ class Localizer:
             return self._take_fix(given)
         if isinstance(given, Reset):
             return self._take_reset(given)
+        if isinstance(given, MapHint):
+            reason = f"there is one map: {given.source} cannot name another one"
+            return [self._status(given.stamp, reason)]
         self._update_requested = True
         return [self._status(given.stamp, "the next scan will be used in any case")]
 
     # ---- inputs
 
     def _take_map(self, given: NewMap) -> list[Output]:
-        matcher = ScanMatcher(given.grid, config=self.config.locate, cache_dir=self._cache_dir)
+        matcher = ScanMatcher(
+            given.grid,
+            config=self.config.locate,
+            cache_dir=self._cache_dir,
+            fields=given.fields,
+        )
         self._tracker = PoseTracker(matcher, self.config, self._rng)
         pause = self.config.monitor.rest_period_s
         self._places = PlaceBelief(matcher.fields, self.config.belief, pause)

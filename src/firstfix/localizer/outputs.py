@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.estimate import Evidence, Hypothesis
+from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.localizer.states import State
 
@@ -158,4 +159,28 @@ class Status:
     elsewhere: float | None = None
 
 
-Output = InitialPose | TrackedPose | Hypotheses | MotionRequest | Status
+@dataclass(frozen=True, eq=False, slots=True)
+class MapSwitched:
+    """The map that all later poses are in: of a site, before the first pose in that map.
+
+    Parameters
+    ----------
+    stamp : float
+        Time, s.
+    map_id : str
+        Its name.
+    grid : OccupancyGrid
+        The map.
+
+    Examples
+    --------
+    >>> ff.MapSwitched(0.0, "ground", grid).map_id
+    'ground'
+    """
+
+    stamp: float
+    map_id: str
+    grid: OccupancyGrid = field(repr=False)
+
+
+Output = MapSwitched | InitialPose | TrackedPose | Hypotheses | MotionRequest | Status
