@@ -19,6 +19,7 @@ import typer
 
 from firstfix import __version__
 from firstfix.cli.bench import bench
+from firstfix.cli.case import case_app
 from firstfix.cli.demo import demo
 from firstfix.cli.doctor import cache_advice, doctor
 from firstfix.cli.fleet import fleet_app
@@ -46,6 +47,7 @@ app = typer.Typer(
 app.command(cls=PlainUsage)(locate)
 app.command(cls=PlainUsage)(track)
 app.command(cls=PlainUsage)(bench)
+app.add_typer(case_app, name="case")
 app.add_typer(map_app, name="map")
 app.add_typer(site_app, name="site")
 app.add_typer(fleet_app, name="fleet")

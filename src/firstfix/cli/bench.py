@@ -11,9 +11,9 @@ import typer
 
 from firstfix.cli.progress import progress
 from firstfix.core.errors import InputError
-from firstfix.global_localization.config import Method
 
 if TYPE_CHECKING:
+    from firstfix.lab.experiments.bench_method import BenchMethod
     from firstfix.lab.experiments.benchmark import Benchmark
     from firstfix.lab.experiments.case import Case
 
@@ -44,7 +44,7 @@ class Printed(Enum):
 
 # Which options belong to which benchmark. --json and --out belong to all.
 _CASES = {"CASES", "--floors", "--sensor"}
-_LOCATE = {*_CASES, "--method", "--wrong-map", "--limit", "--jobs", "--report"}
+_LOCATE = {*_CASES, "--method", "--estimates", "--wrong-map", "--limit", "--jobs", "--report"}
 _OPTIONS = {
     "locating": _LOCATE,
     "--track": {*_CASES, "--params", "--seed", "--jobs"},
@@ -67,8 +67,22 @@ def bench(
         ),
     ] = None,
     method: Annotated[
-        list[Method] | None,
-        typer.Option(help="Which method. Repeatable.", show_default="fast"),
+        list[str] | None,
+        typer.Option(
+            metavar="METHOD",
+            help="fast, paper or paper-basic; or MODULE:FUNCTION, a function of map and scan that "
+            "returns a pose, (pose, confidence) or None. Repeatable.",
+            show_default="fast",
+        ),
+    ] = None,
+    estimates: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="CSV",
+            help="Judge poses of another program: columns case, scan, x, y, yaw and optionally "
+            "confidence. Repeatable.",
+            show_default=False,
+        ),
     ] = None,
     sensor: Annotated[
         list[str] | None,
@@ -204,6 +218,7 @@ def bench(
         "CASES": folders,
         "--floors": floors,
         "--method": method,
+        "--estimates": estimates,
         "--sensor": sensor,
         "--wrong-map": wrong_map,
         "--limit": limit,
@@ -254,9 +269,21 @@ def bench(
     elif measure == "--suite ablation":
         benchmark = benchmarks.ablation_benchmark(found, limit)
     else:
-        methods = list(dict.fromkeys(method or [Method.FAST]))
+        methods = _methods(method or [], estimates or [], on_wrong_maps=wrong_map)
         benchmark = benchmarks.locate_benchmark(found, methods, limit, with_wrong_maps=wrong_map)
     _run(benchmark, jobs, Printed.JSON if as_object else Printed.TABLES, out, report)
+
+
+def _methods(names: list[str], estimates: list[Path], *, on_wrong_maps: bool) -> list[BenchMethod]:
+    from firstfix.lab.experiments.bench_method import Estimates, parse_method, read_estimates
+
+    if estimates and on_wrong_maps:
+        raise InputError("Leave out --wrong-map: --estimates has poses in the right maps only.")
+    for path in estimates:
+        read_estimates(path)  # faults are found before the work
+    if not names and not estimates:
+        names = ["fast"]
+    return [*map(parse_method, dict.fromkeys(names)), *map(Estimates, dict.fromkeys(estimates))]
 
 
 def _check_options(asked: list[str], given: dict[str, Any]) -> str:

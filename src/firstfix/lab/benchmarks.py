@@ -8,8 +8,8 @@ from typing import Any
 
 from firstfix.amcl.config import AmclConfig
 from firstfix.core.errors import InputError
-from firstfix.global_localization.config import Method
 from firstfix.lab.experiments.ablation import AblationTask, ablation_document, ablation_table
+from firstfix.lab.experiments.bench_method import BenchMethod
 from firstfix.lab.experiments.benchmark import Benchmark, Summary
 from firstfix.lab.experiments.case import Case, SensorCut
 from firstfix.lab.experiments.kidnap_bench import KidnapCaseTask, KidnapResult, KidnapWorldTask
@@ -56,7 +56,7 @@ _KIDNAPS_A_TASK = 5
 
 
 def locate_benchmark(
-    cases: Sequence[Case], methods: Sequence[Method], limit: int, *, with_wrong_maps: bool
+    cases: Sequence[Case], methods: Sequence[BenchMethod], limit: int, *, with_wrong_maps: bool
 ) -> Benchmark:
     """Locate scans of cases, on request also in the map of the next other building.
 
@@ -64,7 +64,7 @@ def locate_benchmark(
     ----------
     cases : sequence of Case
         At least one.
-    methods : sequence of Method
+    methods : sequence of BenchMethod
         At least one, each once.
     limit : int
         Scans of a case, evenly spaced; 0 for all.
@@ -78,7 +78,7 @@ def locate_benchmark(
         for sensor in dict.fromkeys(case.sensor for case in cases):
             own = [case for case in cases if case.sensor == sensor]
             tasks += wrong_map_tasks(own, methods, limit)
-    names = [f"{task.case.name}, {task.case.sensor}, {task.method.value}" for task in tasks]
+    names = [f"{task.case.name}, {task.case.sensor}, {task.method.name}" for task in tasks]
 
     def summarize(results: list[CaseRun | WrongMapRun]) -> Summary:
         runs = [run for run in results if isinstance(run, CaseRun)]

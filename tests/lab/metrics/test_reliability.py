@@ -10,7 +10,6 @@ from hypothesis.extra import numpy as hnp
 
 from firstfix.core.estimate import Verdict
 from firstfix.core.pose_error import PoseError
-from firstfix.global_localization.config import Method
 from firstfix.lab.experiments.locate_bench import CaseRun, WrongMapRun
 from firstfix.lab.metrics.outcome import NO_POSE, Outcome
 from firstfix.lab.metrics.reliability import (
@@ -82,10 +81,10 @@ def runs() -> tuple[list[CaseRun], list[WrongMapRun]]:
     wrong = Outcome(1, Verdict.AMBIGUOUS, PoseError(9.0, 0.001), 2, 0.03, 0.04, 0.6)
     lost = Outcome(2, Verdict.NO_MATCH, NO_POSE, None, 0.01, 0.02, 0.0)
     own = [
-        CaseRun(name, name, kind, "recorded", Method.FAST, (right, wrong, lost), 100.0, 0.5, 200.0)
+        CaseRun(name, name, kind, "recorded", "fast", (right, wrong, lost), 100.0, 0.5, 200.0)
         for name, kind in (("a", "real"), ("b", "real"), ("c", "sim"))
     ]
-    return own, [WrongMapRun("a", "a", "real", "recorded", "c", Method.FAST, 2, 1, (0.96, 0.2))]
+    return own, [WrongMapRun("a", "a", "real", "recorded", "c", "fast", 2, 1, (0.96, 0.2))]
 
 
 def test_scans_of_a_kind_are_taken_together() -> None:

@@ -7,7 +7,6 @@ import pytest
 
 from firstfix.core.estimate import Verdict
 from firstfix.core.pose_error import PoseError
-from firstfix.global_localization.config import Method
 from firstfix.lab.experiments.locate_bench import CaseRun, WrongMapRun
 from firstfix.lab.metrics.metrics import summarize
 from firstfix.lab.metrics.outcome import NO_POSE, Outcome
@@ -30,23 +29,23 @@ WRONG = Outcome(1, Verdict.UNIQUE, PoseError(5.0, 0.001), None, 0.05, 0.06, 0.96
 LOST = Outcome(2, Verdict.NO_MATCH, NO_POSE, None, 0.01, 0.02, 0.0)
 
 
-def run(name: str, method: Method, *outcomes: Outcome, sensor: str = "recorded") -> CaseRun:
+def run(name: str, method: str, *outcomes: Outcome, sensor: str = "recorded") -> CaseRun:
     return CaseRun(name, name, "sim", sensor, method, outcomes, 100.0, 0.5, 200.0)
 
 
-def wrong(case: str, on: str, method: Method, n: int, unique: int, *p: float) -> WrongMapRun:
+def wrong(case: str, on: str, method: str, n: int, unique: int, *p: float) -> WrongMapRun:
     return WrongMapRun(case, case, "sim", "recorded", on, method, n, unique, p)
 
 
 RUNS = [
-    run("a", Method.FAST, HIT, HIT, WRONG),
-    run("b", Method.FAST, LOST),
-    run("a", Method.PAPER, WRONG),
+    run("a", "fast", HIT, HIT, WRONG),
+    run("b", "fast", LOST),
+    run("a", "paper", WRONG),
 ]
 WRONG_MAP = [
-    wrong("a", "b", Method.FAST, 3, 1, 0.97, 0.4, 0.0),
-    wrong("b", "a", Method.FAST, 1, 0, 0.3),
-    wrong("a", "b", Method.PAPER, 3, 3, 1.0, 1.0, 1.0),
+    wrong("a", "b", "fast", 3, 1, 0.97, 0.4, 0.0),
+    wrong("b", "a", "fast", 1, 0, 0.3),
+    wrong("a", "b", "paper", 3, 3, 1.0, 1.0, 1.0),
 ]
 DOCUMENT = bench_document(RUNS, WRONG_MAP)
 
@@ -87,7 +86,7 @@ def test_no_wrong_map_is_nothing_counted() -> None:
 
 
 def test_sensors_and_buildings_count_every_scan_alike() -> None:
-    narrow = run("b", Method.FAST, HIT, sensor="60° x 5 m")
+    narrow = run("b", "fast", HIT, sensor="60° x 5 m")
     document = bench_document([*RUNS[:2], narrow], WRONG_MAP[:2])
     recorded, cut = document["sensors"]
     assert (recorded["sensor"], recorded["n"], recorded["wrong_unique"]) == ("recorded", 4, 1)

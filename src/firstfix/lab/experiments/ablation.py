@@ -40,7 +40,7 @@ from firstfix.lab.experiments.case import Case, evenly_spaced, known_truth
 from firstfix.lab.experiments.locate_bench import try_scan
 from firstfix.lab.experiments.machine import this_machine
 from firstfix.lab.metrics.metrics import summarize, total
-from firstfix.lab.metrics.outcome import Outcome
+from firstfix.lab.metrics.outcome import Answer, Outcome
 from firstfix.lab.reports.text import Row, columns_table
 from firstfix.localizer.precompile import precompile
 
@@ -99,6 +99,10 @@ class AblatedMatcher:
         elif without is Without.END_POINTS:
             silent = replace(fields.endpoints, values=_silent(fields.endpoints.values))
             self._searched = _altered(fields, endpoints=silent)
+
+    def answer(self, scan: LaserScan) -> Answer:
+        """Return the answer to a scan, to compare it with the truth."""
+        return Answer.of(self.locate(scan))
 
     def locate(self, scan: LaserScan) -> LocateResult:
         """Find where in the map a scan was taken, as `ScanMatcher.locate` does."""
@@ -194,7 +198,7 @@ def ablate_case(case: Case, grid: OccupancyGrid, limit: int) -> tuple[AblationRu
     tried = evenly_spaced(np.flatnonzero(np.isfinite(truth).all(axis=1)), limit).tolist()
     runs = []
     for without in Without:
-        locate = AblatedMatcher(fields, without).locate
+        locate = AblatedMatcher(fields, without).answer
         outcomes = [
             try_scan(locate, recording.scans[i], SE2.from_array(truth[i]), i) for i in tried
         ]

@@ -5,18 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from firstfix.core.estimate import LocateResult, Verdict
+from firstfix.core.estimate import Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.global_localization.config import Method
-from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.lab.experiments.bench_method import BenchMethod
 from firstfix.lab.experiments.case import Case, evenly_spaced, known_truth, next_elsewhere
 from firstfix.lab.experiments.process_pool import peak_rss_mb
-from firstfix.lab.metrics.outcome import Outcome, best_probability, judge
-from firstfix.localizer.precompile import precompile
+from firstfix.lab.metrics.outcome import Answer, Outcome, judge
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +26,8 @@ class CaseRun:
     ----------
     case, site, kind, sensor : str
         The case.
-    method : Method
-        The method.
+    method : str
+        Name of the method.
     outcomes : tuple of Outcome
         One for each scan that was located.
     free_area_m2 : float
@@ -44,7 +43,7 @@ class CaseRun:
     site: str
     kind: str
     sensor: str
-    method: Method
+    method: str
     outcomes: tuple[Outcome, ...]
     free_area_m2: float
     prepare_s: float
@@ -61,8 +60,8 @@ class WrongMapRun:
         The case of the scans.
     on : str
         The case of the map.
-    method : Method
-        The method.
+    method : str
+        Name of the method.
     n, unique : int
         Scans, and how many of them got the verdict UNIQUE, which is always wrong here.
     probabilities : tuple of float
@@ -74,7 +73,7 @@ class WrongMapRun:
     kind: str
     sensor: str
     on: str
-    method: Method
+    method: str
     n: int
     unique: int
     probabilities: tuple[float, ...]
@@ -85,7 +84,7 @@ class CaseTask:
     """Locate scans of a case, evenly spaced, at most ``limit`` (0: all)."""
 
     case: Case
-    method: Method
+    method: BenchMethod
     limit: int = 0
 
     def __call__(self) -> CaseRun:
@@ -99,12 +98,12 @@ class CaseTask:
         case, recording, grid = self.case, self.case.recording(), self.case.grid()
         truth = known_truth(case, recording)
         tried = evenly_spaced(np.flatnonzero(np.isfinite(truth).all(axis=1)), self.limit)
-        precompile(methods=[self.method])
+        self.method.compile()
         start = time.process_time()
-        matcher = ScanMatcher(grid, method=self.method, cache_dir=None)
+        locate = self.method.prepare(case.name, grid)
         prepare_s = time.process_time() - start
         outcomes = tuple(
-            try_scan(matcher.locate, recording.scans[i], SE2.from_array(truth[i]), i)
+            try_scan(partial(locate, i), recording.scans[i], SE2.from_array(truth[i]), i)
             for i in tried.tolist()
         )
         return CaseRun(
@@ -112,7 +111,7 @@ class CaseTask:
             site=case.site,
             kind=case.kind,
             sensor=case.sensor,
-            method=self.method,
+            method=self.method.name,
             outcomes=outcomes,
             free_area_m2=grid.free_area,
             prepare_s=prepare_s,
@@ -126,30 +125,30 @@ class WrongMapTask:
 
     case: Case
     on: Case
-    method: Method
+    method: BenchMethod
     limit: int = 0
 
     def __call__(self) -> WrongMapRun:
         """Run in this process."""
         case, scans = self.case, self.case.recording().scans
-        matcher = ScanMatcher(self.on.grid(), method=self.method, cache_dir=None)
+        locate = self.method.prepare(self.on.name, self.on.grid())
         tried = evenly_spaced(np.arange(len(scans)), self.limit)
-        results = [matcher.locate(scans[i]) for i in tried.tolist()]
+        answers = [locate(i, scans[i]) for i in tried.tolist()]
         return WrongMapRun(
             case=case.name,
             site=case.site,
             kind=case.kind,
             sensor=case.sensor,
             on=self.on.name,
-            method=self.method,
-            n=len(results),
-            unique=sum(result.verdict is Verdict.UNIQUE for result in results),
-            probabilities=tuple(best_probability(result) for result in results),
+            method=self.method.name,
+            n=len(answers),
+            unique=sum(answer.verdict is Verdict.UNIQUE for answer in answers),
+            probabilities=tuple(answer.probability for answer in answers),
         )
 
 
 def wrong_map_tasks(
-    cases: Sequence[Case], methods: Sequence[Method], limit: int
+    cases: Sequence[Case], methods: Sequence[BenchMethod], limit: int
 ) -> list[WrongMapTask]:
     """List every case with the next one that is another building, for every method."""
     pairs = [(case, next_elsewhere(cases, i)) for i, case in enumerate(cases)]
@@ -162,10 +161,10 @@ def wrong_map_tasks(
 
 
 def try_scan(
-    locate: Callable[[LaserScan], LocateResult], scan: LaserScan, truth: SE2, index: int
+    locate: Callable[[LaserScan], Answer], scan: LaserScan, truth: SE2, index: int
 ) -> Outcome:
     """Locate a scan, measure the time, and compare the answer with the true ``T_map_base``."""
     wall, cpu = time.perf_counter(), time.process_time()
-    result = locate(scan)
+    answer = locate(scan)
     cpu_s, wall_s = time.process_time() - cpu, time.perf_counter() - wall
-    return judge(result, truth, index=index, cpu_s=cpu_s, wall_s=wall_s)
+    return judge(answer, truth, index=index, cpu_s=cpu_s, wall_s=wall_s)

@@ -31,6 +31,7 @@ from firstfix.lab.experiments.locate_bench import try_scan
 from firstfix.lab.experiments.machine import this_machine
 from firstfix.lab.experiments.process_pool import peak_rss_mb
 from firstfix.lab.metrics.metrics import summarize
+from firstfix.lab.metrics.outcome import Answer
 from firstfix.lab.reports.text import Row, columns_table
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import random_free_poses
@@ -152,7 +153,7 @@ class CostTask:
         # The first scan of a sensor may make a layout that the others share.
         matcher.locate(group[0].scan)
         outcomes = [
-            try_scan(matcher.locate, sighting.scan, sighting.truth, i)
+            try_scan(lambda scan: Answer.of(matcher.locate(scan)), sighting.scan, sighting.truth, i)
             for i, sighting in enumerate(group)
         ]
         figures = summarize(outcomes)

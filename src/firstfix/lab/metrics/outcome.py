@@ -15,6 +15,31 @@ FOUND_WELL = PoseError(0.2, math.radians(3.0))
 
 
 @dataclass(frozen=True, slots=True)
+class Answer:
+    """What a method says of one scan.
+
+    Parameters
+    ----------
+    poses : tuple of SE2
+        ``T_map_base``, best first; empty if nothing was found.
+    probability : float
+        Of the first pose, 0 to 1.
+    verdict : Verdict
+        UNIQUE if the first pose may be published.
+    """
+
+    poses: tuple[SE2, ...]
+    probability: float
+    verdict: Verdict
+
+    @classmethod
+    def of(cls, result: LocateResult) -> Answer:
+        """Return what a result says."""
+        probability = result.best.probability if result.best is not None else 0.0
+        return cls(tuple(place.pose for place in result.hypotheses), probability, result.verdict)
+
+
+@dataclass(frozen=True, slots=True)
 class Outcome:
     """The answer to one scan, compared with the truth.
 
@@ -53,21 +78,16 @@ def is_found(pose: SE2, truth: SE2 | None) -> bool:
     return truth is not None and PoseError.between(pose, truth).is_within(FOUND)
 
 
-def judge(result: LocateResult, truth: SE2, *, index: int, cpu_s: float, wall_s: float) -> Outcome:
+def judge(answer: Answer, truth: SE2, *, index: int, cpu_s: float, wall_s: float) -> Outcome:
     """Compare an answer with the true ``T_map_base``, whatever its verdict; times in s."""
-    errors = [PoseError.between(hypothesis.pose, truth) for hypothesis in result.hypotheses]
+    errors = [PoseError.between(pose, truth) for pose in answer.poses]
     ranks = [rank for rank, error in enumerate(errors, 1) if error.is_within(FOUND)]
     return Outcome(
         index,
-        result.verdict,
+        answer.verdict,
         errors[0] if errors else NO_POSE,
         ranks[0] if ranks else None,
         cpu_s,
         wall_s,
-        best_probability(result),
+        answer.probability,
     )
-
-
-def best_probability(result: LocateResult) -> float:
-    """Return the probability of the best hypothesis; 0 if there is none."""
-    return result.best.probability if result.best is not None else 0.0

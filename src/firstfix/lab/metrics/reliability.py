@@ -162,7 +162,7 @@ def reliability_table(entries: Sequence[Row]) -> str:
 
 
 def _key(run: CaseRun | WrongMapRun) -> tuple[str, str, str]:
-    return run.method.value, run.sensor, run.kind
+    return run.method, run.sensor, run.kind
 
 
 def _entry(runs: Sequence[CaseRun], wrong_map: Sequence[WrongMapRun]) -> dict[str, Any]:
@@ -172,7 +172,7 @@ def _entry(runs: Sequence[CaseRun], wrong_map: Sequence[WrongMapRun]) -> dict[st
     elsewhere = np.array([p for run in wrong_map for p in run.probabilities])
     nowhere = np.empty(0)
     return {
-        "method": runs[0].method.value,
+        "method": runs[0].method,
         "sensor": runs[0].sensor,
         "kind": runs[0].kind,
         "n": len(outcomes),

@@ -82,7 +82,7 @@ def bench_document(
             {
                 "name": run.case,
                 "on": run.on,
-                "method": run.method.value,
+                "method": run.method,
                 "sensor": run.sensor,
                 "n": run.n,
                 "unique": run.unique,
@@ -104,7 +104,7 @@ def case_row(run: CaseRun) -> dict[str, Any]:
     """Put one case into figures."""
     return {
         "name": run.case,
-        "method": run.method.value,
+        "method": run.method,
         "sensor": run.sensor,
         "site": run.site,
         "kind": run.kind,
@@ -142,7 +142,7 @@ def wrong_map_table(document: Row) -> str:
 
 
 def _setting(run: CaseRun | WrongMapRun) -> tuple[str, str]:
-    return run.method.value, run.sensor
+    return run.method, run.sensor
 
 
 def _with(setting: tuple[str, str], runs: Sequence[AnyRun]) -> list[AnyRun]:
@@ -156,7 +156,7 @@ def _of(site: str, runs: Sequence[AnyRun]) -> list[AnyRun]:
 def _total(runs: Sequence[CaseRun]) -> dict[str, Any]:
     return {
         "name": "total",
-        "method": runs[0].method.value,
+        "method": runs[0].method,
         "sensor": runs[0].sensor,
         "free_area_m2": mean_of_known(run.free_area_m2 for run in runs),
         **asdict(total([summarize(run.outcomes) for run in runs])),
@@ -171,7 +171,7 @@ def _scans_row(runs: Sequence[CaseRun], wrong_map: Sequence[WrongMapRun]) -> dic
     others = sum(run.n for run in wrong_map)
     accepted = sum(run.unique for run in wrong_map)
     return {
-        "method": runs[0].method.value,
+        "method": runs[0].method,
         "sensor": runs[0].sensor,
         "n": figures.n,
         "success": figures.success,

@@ -119,7 +119,7 @@ def _error_curve(axes: Axes, run: CaseRun, number: int) -> None:
 
 
 def _setting(run: CaseRun) -> str:
-    return f"{run.method.value}, {run.sensor}"
+    return f"{run.method}, {run.sensor}"
 
 
 def _settings(runs: Sequence[CaseRun]) -> list[str]:
