@@ -10,17 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.scan import LaserScan
-from firstfix.global_localization.beams import FEWEST_HITS
+from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.beams import FEWEST_HITS, Beams
 from firstfix.global_localization.look import look_into
 from firstfix.global_localization.sensors import joint_beams
 from firstfix.site.maps import Maps
 from firstfix.site.query import SiteQuery
+from firstfix.site.views import views_of
 
 PROMISING = 40
 """Maps that are searched after a first look at more."""
 
 RECALL = 0.99
 """Probability that the right map is among them (docs/decisions/0022)."""
+
+LOOKS = 3
+"""Views that a first look uses, at most."""
 
 # More than any difference of scores, m.
 _NAMED = 1e3
@@ -86,25 +91,38 @@ def look_at_maps(query: SiteQuery, map_ids: Sequence[str], maps: Maps) -> Looked
     Parameters
     ----------
     query : SiteQuery
-        What is asked. Of several views the newest counts.
+        What is asked. Of several views the mean score of `LOOKS` counts: a sensor that sees little
+        needs more than one.
     map_ids : sequence of str
         The maps; all can be loaded.
     maps : callable
         Loads a map by its id.
     """
-    _, beams = joint_beams(newest_scans(query))
-    if int(np.count_nonzero(beams.hit)) < FEWEST_HITS or not map_ids:
+    looks = [beams for scans in _scans_of_looks(query) if (beams := _enough(scans)) is not None]
+    if not looks or not map_ids:
         return look_at_all(map_ids)
-    found = look_into(beams, [maps(map_id).fields for map_id in map_ids], 1)
-    scores = np.array([of_map.scores.min(initial=_NOTHING) for of_map in found])
+    fields = [maps(map_id).fields for map_id in map_ids]
+    scores = np.mean([_best_scores(beams, fields) for beams in looks], axis=0)
     if query.prior is not None:  # a map that is named is never left out
         scores -= np.array([_NAMED if name in query.prior else 0.0 for name in map_ids])
     return Looked(tuple(map_ids), scores, recall=RECALL, most=PROMISING)
 
 
-def newest_scans(query: SiteQuery) -> tuple[LaserScan, ...]:
-    """Return the scans of the newest time of a query."""
-    newest = max(scan.stamp for scan in query.scans)
+def _scans_of_looks(query: SiteQuery) -> list[tuple[LaserScan, ...]]:
+    """Return the scans of one look, or those of some views, evenly chosen, with the newest."""
     if query.is_one_look:
-        return query.scans
-    return tuple(scan for scan in query.scans if scan.stamp == newest) or query.scans[-1:]
+        return [query.scans]
+    views = views_of(query)
+    index = np.unique(np.linspace(len(views) - 1, 0, LOOKS).round().astype(np.int64))
+    return [views[i].scans for i in index.tolist()]
+
+
+def _enough(scans: Sequence[LaserScan]) -> Beams | None:
+    """Return the beams of a look; None if too few measured a surface."""
+    _, beams = joint_beams(scans)
+    return beams if int(np.count_nonzero(beams.hit)) >= FEWEST_HITS else None
+
+
+def _best_scores(beams: Beams, fields: Sequence[MapFields]) -> NDArray[np.float64]:
+    """Return the score of the best place of each map, shape (n,), m."""
+    return np.array([found.scores.min(initial=_NOTHING) for found in look_into(beams, fields, 1)])
