@@ -50,6 +50,7 @@ _OPTIONS = {
     "--track": {*_CASES, "--params", "--seed", "--jobs"},
     "--kidnap": {*_CASES, "--worlds", "--scenarios", "--seed", "--jobs", "--report"},
     "--starts": {*_CASES, "--runs", "--seed", "--jobs", "--report"},
+    "--site": {"--floors", "--limit"},
     "--suite paper": {"--worlds", "--runs", "--seed", "--jobs", "--report"},
     "--suite scaling": {"--seed", "--report"},
     "--suite ablation": {"CASES", "--limit", "--sensor", "--jobs", "--report"},
@@ -152,6 +153,15 @@ def bench(
             rich_help_panel=STARTING,
         ),
     ] = False,
+    site: Annotated[
+        bool,
+        typer.Option(
+            "--site",
+            help="Make one site of the maps of --floors and ask in which map, and where, scans of "
+            "their true worlds were taken instead.",
+            rich_help_panel=STARTING,
+        ),
+    ] = False,
     kidnapped: Annotated[
         bool,
         typer.Option(
@@ -230,7 +240,7 @@ def bench(
         "--worlds": worlds,
         "--runs": runs,
     }
-    asked = {"--track": tracked, "--starts": starts, "--kidnap": kidnapped}
+    asked = {"--track": tracked, "--starts": starts, "--kidnap": kidnapped, "--site": site}
     if suite is not None:
         asked[f"--suite {suite.value}"] = True
     measure = _check_options([name for name, is_asked in asked.items() if is_asked], given)
@@ -239,11 +249,16 @@ def bench(
     from firstfix.lab.experiments.case import find_cases, parse_sensor
     from firstfix.lab.experiments.floor_cases import floor_case, parse_floors
     from firstfix.lab.experiments.paper_bench import PAPER_WORLDS
+    from firstfix.lab.experiments.site_bench import QUERIES
     from firstfix.lab.experiments.track_log import load_config
     from firstfix.lab.reports.output_files import check_targets
     from firstfix.lab.worlds.catalog import WORLDS, parse_worlds
 
     sensors = list(dict.fromkeys(parse_sensor(text) for text in sensor or ["recorded"]))
+    if measure == "--site":
+        benchmark = benchmarks.site_benchmark(parse_floors(floors), limit or QUERIES)
+        _run(benchmark, 1, Printed.JSON if as_object else Printed.TABLES, out, report)
+        return
     drawn = [floor_case(number) for number in parse_floors(floors)]
     found: list[Case] = benchmarks.cut_to_sensors([*find_cases(folders), *drawn], sensors)
     first_seed = seed or 0

@@ -27,6 +27,12 @@ from firstfix.lab.experiments.scaling import (
     scaling_tasks,
     threads_table,
 )
+from firstfix.lab.experiments.site_bench import (
+    SiteFigures,
+    SiteTask,
+    site_document,
+    site_table,
+)
 from firstfix.lab.experiments.start_bench import StartResult, StartTask
 from firstfix.lab.experiments.track_bench import TrackRun, TrackTask, track_document, track_table
 from firstfix.lab.reports import start_report
@@ -212,6 +218,21 @@ def scaling_benchmark(seed: int) -> Benchmark:
         f"{part}, {task.grid.free_area:.0f} m²" for part, task in zip(parts, tasks, strict=True)
     ]
     return Benchmark(tasks, names, summarize)
+
+
+def site_benchmark(seeds: Sequence[int], queries: int) -> Benchmark:
+    """Ask a site of random floors in which map, and where in it, scans were taken."""
+
+    def summarize(results: list[SiteFigures]) -> Summary:
+        document = site_document(results[0])
+        far = document["extrapolated"]
+        note = (
+            f"extrapolated, not measured: {far['floors']} floors take {far['cpu_s']:.1f} s of "
+            f"processor time, {far['wall_s_16_cores']:.2f} s on 16 cores"
+        )
+        return Summary(document, (site_table(document),), (note,))
+
+    return Benchmark([SiteTask(tuple(seeds), queries)], [f"{len(seeds)} floors"], summarize)
 
 
 def ablation_benchmark(cases: Sequence[Case], limit: int) -> Benchmark:
