@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from firstfix.belief.belief import begin, update
-from firstfix.belief.evidence import exponent, log_likelihoods, novelty, shares
+from firstfix.belief.evidence import FLOOR, exponent, log_likelihoods, novelty, shares
 from firstfix.belief.planar import between, compose
 from firstfix.belief.tracks import CAREFUL_BEAMS
 from firstfix.belief.view import Observation, View, costs
@@ -60,8 +60,8 @@ def _joint(
     total = np.zeros(len(poses))
     for seen in window:
         there = compose(poses, between(last, seen.odometry))
-        total += costs(there, seen, beams, fields)
-    return total / len(window)
+        total += np.log(costs(there, seen, beams, fields) + FLOOR)
+    return np.exp(total / len(window)) - FLOOR
 
 
 def _everywhere(fields: MapFields) -> NDArray[np.float64]:

@@ -21,8 +21,9 @@ cannot rule out:
 2. *Entry.* The view's own search of the whole map proposes places. They get a past: poses and costs
    at the earlier views of the window. So a place that was dropped, or that a kidnapped robot is at,
    is weighed by the same views as all others.
-3. *Evidence.* The joint mean cost over the latest views becomes a likelihood by the power law of
-   the static stage; its exponent grows with the number of independent views. Priors are added.
+3. *Evidence.* The cost at each view that is kept becomes a likelihood by the power law of the
+   static stage, and these are multiplied. Their exponents sum to one that grows with the number
+   of independent views. Priors are added.
 4. *Merging.* Poses at one place become one and keep the oldest id; what is negligible is dropped,
    and its mass is elsewhere.
 5. *Verdict.* A place is published when it is sure in two views from different poses. A sensor that

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from firstfix.belief.view import Observation
 from firstfix.core.angles import angle_error
 
-# The power law of docs/decisions/0005 on the mean cost of all views. Its exponent grows with the
-# number of independent views, slowly: what is wrong in the map is wrong in several views. All of
-# these are chosen by leaving out one of nine buildings at a time, over four sensors; around them,
-# nothing changes much.
+# The power law of docs/decisions/0005 on the cost at each view. The exponents of all views sum to
+# one that grows with the number of independent views, slowly: what is wrong in the map is wrong in
+# several views. All of these are chosen by leaving out one of nine buildings at a time, over four
+# sensors, with the mean cost of all views; docs/decisions/0020 says what the product changes.
 EXPONENT = 12.0
 EXPONENT_GROWTH = 0.5
 FLOOR = 0.3
@@ -79,6 +79,6 @@ def shares(logs: NDArray[np.float64], power: float) -> tuple[NDArray[np.float64]
 
 
 def log_likelihoods(mean_costs: NDArray[np.float64], power: float) -> NDArray[np.float64]:
-    """Turn joint mean costs into log-likelihoods, up to a constant; the same shape."""
+    """Turn mean costs of a beam into log-likelihoods, up to a constant; the same shape."""
     logs: NDArray[np.float64] = -power * np.log(mean_costs + FLOOR)
     return logs

@@ -13,8 +13,8 @@ from firstfix.belief.evidence import exponent, log_likelihoods, novelty
 from firstfix.belief.tracks import Tracks
 from firstfix.belief.view import Observation
 
-# Odometry errs together with itself, as views do.
-ODOMETRY_WEIGHT = 1.0
+# Wheels slip once in twenty views; how far does not matter then.
+SLIP_LOG = math.log(0.05)
 
 # Log-probability that the robot was carried since its older views: as that of a wrong hint.
 CARRIED_LOG = math.log(0.001)
@@ -48,18 +48,19 @@ def joint_log_likelihoods(
     ndarray, shape (n,)
         Log-likelihoods.
     """
-    costs, power = tracks.costs, power_of(window)
-    stayed = log_likelihoods(costs.mean(axis=1), power) - _strain(tracks)
+    by_view = log_likelihoods(tracks.costs, power_of(window) / len(window))
+    by_view += odometry_logs(tracks.strains)
+    stayed: NDArray[np.float64] = by_view.sum(axis=1)
     older = len(window) - config.window
     if older <= 0 or len(tracks) == 0:
         return stayed
-    before = float(costs[:, :older].mean(axis=1).min())
-    since = (costs[:, older:].sum(axis=1) + older * before) / len(window)
-    carried = log_likelihoods(since, power) - _strain(tracks.over(slice(older, None)))
-    logs: NDArray[np.float64] = np.maximum(stayed, carried + CARRIED_LOG)
+    before = float(by_view[:, :older].sum(axis=1).max())
+    carried = by_view[:, older:].sum(axis=1) + before + CARRIED_LOG
+    logs: NDArray[np.float64] = np.maximum(stayed, carried)
     return logs
 
 
-def _strain(tracks: Tracks) -> NDArray[np.float64]:
-    weighted: NDArray[np.float64] = ODOMETRY_WEIGHT * tracks.strains.sum(axis=1)
-    return weighted
+def odometry_logs(strains: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the log-likelihoods of adjustments from their strains, same shape."""
+    logs: NDArray[np.float64] = -np.minimum(strains, -SLIP_LOG)
+    return logs

@@ -20,7 +20,8 @@ EXPLAINED_COST = 1.6
 # A place that was published stays so while it is more likely than all others together.
 STAYING_PROBABILITY = 0.5
 
-# Least probability, by the law of the static stage, with which one scan decides.
+# Least probability, by the law of the static stage and by that of views, with which one scan
+# decides.
 ALONE_PROBABILITY = 0.95
 
 # A second decision counts from a view that was taken this far away, or turned by this much.
@@ -132,8 +133,8 @@ def judge(
         kept = known if stays else None
         return Judgement(Verdict.AMBIGUOUS, reason, kept, unexplained=True)
     alone = seen.decides_alone and _alone(costs[:, -1], len(seen.beams)) >= ALONE_PROBABILITY
-    # A first view is judged by the law of single scans, which is known well; it is less strict.
-    first = alone and len(window) == 1
+    # A first view is judged by the law of single scans, which is known well, and is less strict.
+    first = alone and len(window) == 1 and probabilities[0] >= ALONE_PROBABILITY
     if not (stays or first) and probabilities[0] < rule.probability:
         return Judgement(Verdict.AMBIGUOUS, _undecided(probabilities, len(window)), None)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from firstfix.belief.adjust import slack_between, strains
 from firstfix.belief.evidence import log_likelihoods
-from firstfix.belief.joint import power_of
+from firstfix.belief.joint import odometry_logs, power_of
 from firstfix.belief.planar import between, compose
 from firstfix.belief.tracks import Tracks
 from firstfix.belief.view import Observation
@@ -55,11 +55,9 @@ def rejoin(
     track, place = np.nonzero(near)
     slack = slack_between(window[-2], window[-1])
     strain = strains(predicted[track], entering.now[place], slack)
-    power, newest = power_of(window), entering.costs[place, 0]
-    mean = tracks.costs[track].mean(axis=1)
-    moved = mean + (newest - tracks.costs[track, -1]) / len(window)
-    gain = log_likelihoods(moved, power) - log_likelihoods(mean, power)
-    gain += tracks.strains[track, -1] - strain
+    power, newest = power_of(window) / len(window), entering.costs[place, 0]
+    gain = log_likelihoods(newest, power) - log_likelihoods(tracks.costs[track, -1], power)
+    gain += odometry_logs(strain) - odometry_logs(tracks.strains[track, -1])
     # Of the places within reach of one track the best comes last, and stays.
     order = np.argsort(gain, kind="stable")
     order = order[gain[order] > 0.0]
