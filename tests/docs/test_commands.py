@@ -14,7 +14,7 @@ PAGES = sorted([*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")])
 # An indented line of code, or text between backticks.
 CODE = re.compile(r"^ {4,}(\S.*)$|`([^`]+)`", re.MULTILINE)
 COMMAND = re.compile(r"^(?:\S*/)?firstfix ([a-z].*)")
-TARGET = re.compile(r"(?:^|\s)make ([a-z][a-z-]*)")
+TARGET = re.compile(r"(?<!case )\bmake ([a-z-]+)")
 SCRIPT = re.compile(r"\b(?:benchmarks|fuzz|docs|\.ci)/[\w/-]+\.py\b")
 
 
