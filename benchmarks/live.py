@@ -57,7 +57,9 @@ def serve(pipe: Connection) -> None:
     """Show frames until the end; answer each request with CPU time and memory so far."""
     grid, placed = office(), scans(POSES)
     store = SnapshotStore("office")
-    localizer: Any = SimpleNamespace(matcher=ScanMatcher(grid), particles=None, belief=None)
+    localizer: Any = SimpleNamespace(
+        matcher=ScanMatcher(grid), particles=None, belief=None, changes=None, view=None
+    )
     store(NewMap(0.0, grid), [], localizer)
     is_over = threading.Event()
 
@@ -76,7 +78,9 @@ def serve(pipe: Connection) -> None:
             localizer.particles = beliefs[i % POSES]
             tracked = TrackedPose(stamp, pose, NOWHERE, pose)
             status = Status(stamp, State.LOCALIZED, "100% of the beams fit", evidence)
-            store(replace(scan, stamp=stamp), [tracked, status], localizer)
+            scan = replace(scan, stamp=stamp)
+            localizer.view = SimpleNamespace(scans=(scan,))
+            store(scan, [tracked, status], localizer)
 
     showing = threading.Thread(target=show)
     with listen("127.0.0.1", 0) as listening:
