@@ -91,6 +91,7 @@ def test_the_rayservice_is_one() -> None:
     assert int(application["args"]["workers"]) == cores * workers["replicas"]
 
 
+@pytest.mark.filterwarnings("ignore")  # of pydantic, in Ray
 def test_the_application_of_the_rayservice_fits_the_schema_of_ray(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

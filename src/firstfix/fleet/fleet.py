@@ -48,6 +48,8 @@ class Fleet:
         A sentence for each map that cannot.
     memory : dict of int to int
         What each worker used when it last answered, bytes.
+    cpu_s : dict of int to float
+        Processor time of each worker when it last answered, s; from 0 after a loss.
     lost_jobs : int
         Jobs that were lost with their worker.
     """
@@ -57,6 +59,7 @@ class Fleet:
     prepared: set[str] = field(default_factory=set)
     faults: dict[str, str] = field(default_factory=dict)
     memory: dict[int, int] = field(default_factory=dict)
+    cpu_s: dict[int, float] = field(default_factory=dict)
     lost_jobs: int = 0
 
     @property
@@ -162,7 +165,7 @@ class Fleet:
             except WorkerLostError:
                 self.lost_jobs += 1
                 continue
-            self.memory[worker] = done.memory
+            self.memory[worker], self.cpu_s[worker] = done.memory, done.cpu_s
             return done.result
         raise NotReadyError(
             "A part of the maps cannot be reached: its worker was lost and is started again. "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,7 +69,7 @@ class Search:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Done(Generic[T]):
-    """The result of a job, and the memory of its worker.
+    """The result of a job, and what its worker has used.
 
     Parameters
     ----------
@@ -76,10 +77,13 @@ class Done(Generic[T]):
         What the job returned.
     memory : int
         Memory that the process of the worker uses, bytes; 0 where the system does not say.
+    cpu_s : float
+        Processor time since the process started, s.
     """
 
     result: T
     memory: int
+    cpu_s: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +152,7 @@ def _size(entry: SiteMap) -> int:
 
 def run_job(job: Job[T], site: Site) -> Done[T]:
     """Do a job in this process."""
-    return Done(job.run(site), memory_of_this_process())
+    return Done(job.run(site), memory_of_this_process(), time.process_time())
 
 
 def memory_of_this_process() -> int:

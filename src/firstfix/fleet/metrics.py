@@ -101,6 +101,12 @@ class _ServiceCollector(Collector):
         for worker, size in fleet.memory.items():
             memory.add_metric([str(worker)], size)
         yield memory
+        cpu = CounterMetricFamily(
+            "firstfix_worker_cpu_seconds", "Processor time of a worker.", labels=["worker"]
+        )
+        for worker, seconds in fleet.cpu_s.items():
+            cpu.add_metric([str(worker)], seconds)
+        yield cpu
         for name, text, value in (
             ("firstfix_queue", "Queries that run or wait.", service.waiting),
             ("firstfix_robots", "Robots that are remembered.", len(service.sessions)),
