@@ -302,6 +302,15 @@ def test_a_search_needs_no_start(cli, files: tuple[Path, Path]) -> None:
     assert len(load_trajectory(Path("found.tum"))) == document["scans"]
 
 
+def test_a_search_may_begin_near_a_pose(cli, files: tuple[Path, Path]) -> None:
+    ended = cli("track", *files, "--start", "search", "--near", "3,3", "--radius", "6", "--json")
+    assert ended.status == 0, ended
+    assert strict_json(ended.out)["kept"] == 1.0
+    for arguments in (("--near", "3,3"), ("--start", "search", "--near", "999,0")):
+        ended = cli("track", *files, *arguments)
+        assert (ended.status, ended.err.count("\n")) == (2, 1)
+
+
 @pytest.mark.slow
 def test_a_search_that_finds_nothing_gives_the_reason(
     cli, files: tuple[Path, Path], alike: tuple[Path, Path]

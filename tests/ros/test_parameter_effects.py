@@ -51,7 +51,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "height_band": {"to": "0.3 1.0", "in": "points", "with": {"cloud_topics": "points"}},
     "laser_pose": {"to": "1.0,0.0,0.0"},
     "laser_frame": {"to": "nowhere"},
-    "zones": {"to": "corner", "with": {"yaml_filename": "map.yaml"}},
+    "zones": {"to": "last", "in": "rooms", "with": {"yaml_filename": "rooms.yaml"}},
     "map_topic": {"to": "floor_plan"},
     "first_map_only": {"to": True},
     "set_initial_pose": {"to": True},
@@ -226,7 +226,9 @@ def outcome(
     monkeypatch.setattr("firstfix.ros.node.time", SimpleNamespace(monotonic=lambda: 0.0))
     monkeypatch.chdir(tmp_path)
     save_map(OccupancyGrid(np.eye(50, dtype=np.int8) * 100, 0.05), tmp_path / "map.yaml")
-    (tmp_path / "map.zones.yaml").write_text("zones: {corner: [[0, 0], [1, 0], [1, 2]]}")
+    save_map(identical_rooms(4), tmp_path / "rooms.yaml")
+    zone = "zones: {last: [[24, 0], [32, 0], [32, 8], [24, 8]]}"
+    (tmp_path / "rooms.zones.yaml").write_text(zone)
 
     saved: list[str] = []
     monkeypatch.setattr(

@@ -1,4 +1,4 @@
-"""Options of ``locate`` that say where the robot may be."""
+"""Options of ``locate`` and ``track`` that say where the robot may be."""
 
 from __future__ import annotations
 

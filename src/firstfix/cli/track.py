@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from firstfix.cli.prior_options import NearPoses, Radius, RegionText, prior_of
 from firstfix.cli.progress import progress
 from firstfix.cli.sensor_options import (
     BaseFrame,
@@ -62,6 +63,9 @@ def track(
     base_frame: BaseFrame = None,
     laser_frame: LaserFrame = None,
     height_band: HeightBand = None,
+    near: NearPoses = None,
+    radius: Radius = None,
+    region: RegionText = None,
     keep_pose: Annotated[
         Path | None,
         typer.Option(
@@ -86,9 +90,16 @@ def track(
     """
     requested = _parse_start(start)
     _check_targets(out, plot, keep_pose)
+    prior = prior_of(map_path, near, radius, region)
+    if prior is not None and requested != SEARCH:
+        raise InputError(
+            "--near and --region say where a search begins. Add --start search, or leave them out."
+        )
     from firstfix.io.maps.map_server import load_map
 
     grid = load_map(map_path)
+    if prior is not None:
+        prior.check(grid)
     recording = read_log(log, topic, laser_pose, base_frame, laser_frame, None, height_band)
 
     # Imported after the files are read, so that bad input is refused at once.
@@ -109,7 +120,8 @@ def track(
     keeper = PoseKeeper(keep_pose, config.save_pose_rate) if keep_pose is not None else None
     try:
         with progress(len(recording), "tracking") as done:
-            tracked_log = track_log(recording, grid, begin, config.localizer.amcl, done, keeper)
+            amcl = config.localizer.amcl
+            tracked_log = track_log(recording, grid, begin, amcl, done, keeper, prior)
     except NeverFoundError as error:
         typer.echo(f"{error}")
         raise typer.Exit(NO_ANSWER) from None

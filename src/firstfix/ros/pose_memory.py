@@ -18,6 +18,12 @@ from firstfix.localizer.states import State
 from firstfix.ros.node_config import NodeConfig
 from firstfix.ros.transport import Severity
 
+# What was saved is good to this at first, m. People move robots that are switched off: a metre in
+# each ten minutes, up to a room.
+_RADIUS_M = 1.0
+_GROWTH_M_S = 1.0 / 600.0
+_LARGEST_RADIUS_M = 5.0
+
 
 class PoseKeeper:
     """A file with the last pose.
@@ -156,7 +162,9 @@ class PoseMemory:
         self._log(Severity.INFO, f"the saved pose is {recalled.outcome.value}: {recalled.reason}")
         if recalled.T_map_base is None:
             return None
-        return PoseHint(odometry.stamp, recalled.T_map_base, "the saved pose")
+        age_s = max(0.0, odometry.stamp - saved.stamp)
+        radius = min(_RADIUS_M + _GROWTH_M_S * age_s, _LARGEST_RADIUS_M)
+        return PoseHint(odometry.stamp, recalled.T_map_base, "the saved pose", radius=radius)
 
     def _set(self, odometry: Odometry) -> PoseHint | None:
         if not self._config.set_initial_pose:

@@ -19,6 +19,7 @@ from firstfix.core.recording import Recording
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.prior import Prior
 from firstfix.io.recalled_pose import recall
 from firstfix.io.saved_pose import SavedPose, load_pose, map_key
 from firstfix.lab.experiments.case import truth_at
@@ -32,7 +33,7 @@ from firstfix.lab.experiments.drive_tracking import (
     make_tracker,
 )
 from firstfix.localizer.config import LocalizerConfig
-from firstfix.localizer.inputs import NewMap
+from firstfix.localizer.inputs import NewMap, Reset
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import InitialPose, Output, Status, TrackedPose
 from firstfix.localizer.replay import replay
@@ -165,6 +166,7 @@ def track_log(
     config: AmclConfig,
     done: Callable[[str], None],
     keeper: PoseKeeper | None,
+    prior: Prior | None = None,
 ) -> TrackedLog:
     """Track a log, after a search if the start asks for one.
 
@@ -182,6 +184,8 @@ def track_log(
         Takes the progress after every scan, in words.
     keeper : PoseKeeper or None
         Saves the pose now and then (not during a search) and at the end.
+    prior : Prior, optional
+        Of the pose at the first scan of a search.
 
     Raises
     ------
@@ -190,7 +194,7 @@ def track_log(
     """
     key = map_key(grid)
     if start.origin is Origin.SEARCH:
-        drive, tracked = search_and_follow(recording, grid, config, done)
+        drive, tracked = search_and_follow(recording, grid, config, done, prior)
     else:
         drive = plan_drive(recording, start.T_map_base)
         check_start(grid, drive.begin_at)
@@ -206,7 +210,11 @@ def track_log(
 
 
 def search_and_follow(
-    recording: Recording, grid: OccupancyGrid, config: AmclConfig, done: Callable[[str], None]
+    recording: Recording,
+    grid: OccupancyGrid,
+    config: AmclConfig,
+    done: Callable[[str], None],
+    prior: Prior | None = None,
 ) -> tuple[Drive, list[TrackedScan]]:
     """Replay a log to a localizer that searches the whole map.
 
@@ -226,7 +234,10 @@ def search_and_follow(
     odometry = dict(known_odometry(recording))
     index_at = {scan.stamp: i for i, scan in enumerate(recording.scans)}
     localizer = Localizer(LocalizerConfig(amcl=config))
-    localizer.handle(NewMap(recording.scans[0].stamp, grid))
+    began_at = recording.scans[0].stamp
+    localizer.handle(NewMap(began_at, grid))
+    if prior is not None:
+        localizer.handle(Reset(began_at, prior))
     tracked: list[TrackedScan] = []
     reason, cpu_s = "no scan has odometry at its stamp", 0.0
     began = time.process_time()
@@ -234,7 +245,8 @@ def search_and_follow(
         cpu_s += time.process_time() - began
         reason = next((o.reason for o in reversed(outputs) if isinstance(o, Status)), reason)
         for output in outputs:
-            if isinstance(output, TrackedPose):
+            # A scan of a sensor with another clock has the stamp of odometry.
+            if isinstance(output, TrackedPose) and output.stamp in index_at:
                 index = index_at[output.stamp]
                 before = tracked[-1].sight.index if tracked else None
                 found = _found_in(outputs)
