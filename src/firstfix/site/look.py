@@ -21,8 +21,8 @@ from firstfix.site.views import views_of
 PROMISING = 40
 """Maps that are searched after a first look at more."""
 
-RECALL = 0.99
-"""Probability that the right map is among them (docs/decisions/0022)."""
+RECALL = 0.97
+"""Probability that a look keeps the right place and map (docs/decisions/0022)."""
 
 LOOKS = 3
 """Views that a first look uses, at most."""
@@ -75,14 +75,15 @@ class Looked:
         return cls(
             map_ids=map_ids,
             scores=np.concatenate([part.scores for part in parts]),
-            recall=1.0 if len(map_ids) <= most else min(part.recall for part in parts),
+            recall=1.0 if len(map_ids) <= PROMISING else min(part.recall for part in parts),
             most=most,
         )
 
 
 def look_at_all(map_ids: Sequence[str]) -> Looked:
-    """Find every map promising."""
-    return Looked(tuple(map_ids), np.zeros(len(map_ids)), recall=1.0, most=sys.maxsize)
+    """Find every map promising; the search itself looks first."""
+    recall = 1.0 if len(map_ids) <= PROMISING else RECALL
+    return Looked(tuple(map_ids), np.zeros(len(map_ids)), recall, most=sys.maxsize)
 
 
 def look_at_maps(query: SiteQuery, map_ids: Sequence[str], maps: Maps) -> Looked:

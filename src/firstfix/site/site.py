@@ -195,7 +195,9 @@ class Site:
         """
         started = time.perf_counter()
         query = self.query(scan, T_odom_base, prior)
-        looked = self.first_look(query)
+        # The search of one look is a look into all maps together: to rank maps before is no gain.
+        one_stage = query.is_one_look or len(self.map_ids) <= PROMISING
+        looked = look_at_all(self.map_ids) if one_stage else self.first_look(query)
         found = self.search(query, looked.promising)
         result = judge_site(query, [looked], [found])
         return replace(
@@ -228,8 +230,6 @@ class Site:
         """
         chosen = self.map_ids if map_ids is None else tuple(map_ids)
         usable = [name for name in chosen if self._is_usable(self._entry(name))]
-        if map_ids is None and len(usable) <= PROMISING:
-            return look_at_all(usable)
         return look_at_maps(query, usable, self._maps.get)
 
     def search(self, query: SiteQuery, map_ids: Sequence[str]) -> SiteCandidates:
