@@ -113,10 +113,11 @@ def shared() -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Keep cached maps of tests, and of the processes they start, out of the user's cache."""
+    """Keep cached maps and incidents of tests and of their processes out of the user's folders."""
     folder = tmp_path_factory.mktemp("firstfix-cache")
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("FIRSTFIX_CACHE_DIR", str(folder))
+        environment.setenv("FIRSTFIX_INCIDENT_DIR", str(tmp_path_factory.mktemp("incidents")))
         yield folder
 
 

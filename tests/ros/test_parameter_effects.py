@@ -66,6 +66,8 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "cloud_rate": {"to": 50.0},
     "status_rate": {"to": 50.0},
     "scan_timeout": {"to": 60.0},
+    "incident_seconds": {"to": 0.0, "in": "a loss"},
+    "incident_folder": {"to": "incidents"},
     "alpha1": {"to": 2.0},
     "alpha2": {"to": 2.0},
     "alpha3": {"to": 2.0},
@@ -171,6 +173,7 @@ class Drive:
         recorder = Recorder(self.wire)
         recorder.listening = {PARTICLES.name: 1, INITIAL_POSE.name: 1}
         node = Node(config, recorder)
+        before = len(node.incidents.folder.files())
         if config.yaml_filename:
             node._load_own_map()
         node._prepare()
@@ -183,7 +186,10 @@ class Drive:
         topics = sorted(topic.name for _, topic in subscriptions(config))
         # What the live page shows of changes of the map.
         changes = f"changes: {node._localizer.changes is not None}"
-        return [*topics, *map(str, recorder.published), *map(str, recorder.lines), changes]
+        node.incidents.close()
+        saved = len(node.incidents.folder.files()) - before
+        lines = [f"{node.incidents.folder.path}", f"{saved} incidents", changes]
+        return [*topics, *map(str, recorder.published), *map(str, recorder.lines), *lines]
 
 
 @pytest.fixture(scope="module")

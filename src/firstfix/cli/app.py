@@ -26,6 +26,7 @@ from firstfix.cli.fleet import fleet_app
 from firstfix.cli.locate import locate
 from firstfix.cli.map import map_app
 from firstfix.cli.nodes import AFTER_DASHES, PASSED_ON, dds, ros1, ros2
+from firstfix.cli.replay import replay
 from firstfix.cli.serve import serve
 from firstfix.cli.site import site_app
 from firstfix.cli.track import track
@@ -46,6 +47,7 @@ app = typer.Typer(
 )
 app.command(cls=PlainUsage)(locate)
 app.command(cls=PlainUsage)(track)
+app.command(cls=PlainUsage)(replay)
 app.command(cls=PlainUsage)(bench)
 app.add_typer(case_app, name="case")
 app.add_typer(map_app, name="map")

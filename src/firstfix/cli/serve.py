@@ -201,7 +201,7 @@ def serve_simulated(
         executor = CommandExecutor(store, node.give, robot)
         page = Page("sim", store, executor, access, on_first_viewer=robot.resume)
         node.start()
-        _announce(listening, access)
+        announce(listening, access)
         with suppress(KeyboardInterrupt):  # the usual end; some versions of uvicorn raise it
             make_server(page).run(sockets=[listening])
         node.stop()
@@ -231,7 +231,7 @@ def serve_robot(
     access, run = address.access(), runner(robot)
     check_searchable(load_map(map_path))
     with listen(address.host, address.port) as listening:
-        _announce(listening, access)
+        announce(listening, access)
         watchers = [] if bridge is None else [bridge]
         with BackgroundPage(robot, map_path.stem, access, listening, watchers) as page:
             if bridge is not None:
@@ -239,7 +239,7 @@ def serve_robot(
             run(f"{map_path.resolve()}", arguments, page.make_node)
 
 
-def _announce(listening: socket.socket, access: AccessPolicy) -> None:
+def announce(listening: socket.socket, access: AccessPolicy) -> None:
     """Print the address of the page, and open it in a browser if there is a display."""
     from firstfix.web.server import url_of
 

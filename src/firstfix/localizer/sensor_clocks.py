@@ -24,7 +24,9 @@ _CLOCK_S = 0.25
 
 
 @dataclass(slots=True)
-class _Clock:
+class Clock:
+    """When a sensor sends, and how old its scans are on arrival, s."""
+
     last: float
     periods: deque[float] = field(default_factory=lambda: deque(maxlen=_PERIODS))
     delays: deque[float] = field(default_factory=lambda: deque(maxlen=_ARRIVALS))
@@ -44,7 +46,7 @@ class SensorClocks:
     """The rates and the clocks of the sensors of a robot."""
 
     def __init__(self) -> None:
-        self._clocks: dict[str, _Clock] = {}
+        self._clocks: dict[str, Clock] = {}
         self._reported: set[str] = set()
 
     @property
@@ -60,7 +62,7 @@ class SensorClocks:
 
     def note(self, scan: LaserScan, now: float | None) -> None:
         """Note the arrival of a scan while the newest odometry has the stamp ``now``."""
-        clock = self._clocks.setdefault(scan.sensor, _Clock(scan.stamp))
+        clock = self._clocks.setdefault(scan.sensor, Clock(scan.stamp))
         if scan.stamp > clock.last:
             clock.periods.append(scan.stamp - clock.last)
         clock.last = scan.stamp

@@ -17,6 +17,7 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.fields.cache import cache_folder
 from firstfix.global_localization.prior import Prior
+from firstfix.io.incident_files import IncidentFolder, incident_folder
 from firstfix.io.maps.zones import load_zones
 from firstfix.io.ros_messages.outgoing import occupancy_grid
 from firstfix.localizer.inputs import Input, NewMap, Reset
@@ -26,6 +27,7 @@ from firstfix.localizer.precompile import precompile
 from firstfix.ros.channels import SENSORS, Channel, subscribed_topics
 from firstfix.ros.exact_stamps import ExactStamps
 from firstfix.ros.inbox import Inbox
+from firstfix.ros.incident_keeper import IncidentKeeper
 from firstfix.ros.map_files import map_from, path_of, result_of
 from firstfix.ros.message_converter import MessageConverter
 from firstfix.ros.node_config import NodeConfig
@@ -68,6 +70,11 @@ class Node:
         self._converter = MessageConverter(config, stamps, self.warn_throttled)
         self._publisher = OutputPublisher(config, stamps, transport)
         self._memory = PoseMemory(config, transport.log)
+        self.incidents = IncidentKeeper(
+            config.incident_seconds,
+            IncidentFolder(incident_folder(config.incident_folder)),
+            lambda text: self.warn_throttled("incidents", text),
+        )
         self._localizer = Localizer(config.localizer, cache_folder())
         self._prior: Prior | None = None  # of the first search
         self._map: NewMap | None = None  # of yaml_filename, then the one in use
@@ -120,7 +127,7 @@ class Node:
         self.receive(Channel.INPUT, given)
 
     def answer(self, request: Request, message: Any) -> dict[str, Any]:
-        """Handle the request of a service; returns at once, except for a map that is loaded.
+        """Handle the request of a service; returns at once unless it reads or writes a file.
 
         Parameters
         ----------
@@ -146,6 +153,8 @@ class Node:
             return {"success": True}
         elif request is Request.LOAD_MAP:
             return self._load_map(str(message.map_url))
+        elif request is Request.SAVE_INCIDENT:
+            return self._save_incident()
         return {}
 
     def warn_throttled(
@@ -166,6 +175,13 @@ class Node:
         if now - self._logged_at.get(subject, -_REPEAT_S) >= _REPEAT_S:
             self._logged_at[subject] = now
             self._transport.log(severity, text)
+
+    def _save_incident(self) -> dict[str, Any]:
+        try:
+            path = self.incidents.folder.path / self.incidents.save("a service was called")
+        except InputError as error:
+            return {"success": False, "message": f"{error}"}
+        return {"success": True, "message": f"{path}"}
 
     def _load_map(self, url: str) -> dict[str, Any]:
         try:
@@ -206,6 +222,7 @@ class Node:
             if time.monotonic() - self.expects_topics_since >= _SILENCE_S:
                 self._report_silent_topics()
         self._try(self._memory.close)
+        self._try(self.incidents.close)
         # The arrays must not wait for the collector of reference cycles.
         del self._localizer, self._converter
 
@@ -266,6 +283,7 @@ class Node:
     def _publish(self, given: Input, outputs: list[Output]) -> None:
         self._publisher.publish(outputs, self._localizer.particles)
         self._memory.keep(outputs)
+        self.incidents(given, outputs, self._localizer)
         for watch in self._watchers:
             watch(given, outputs, self._localizer)
 

@@ -102,6 +102,16 @@ class NodeConfig:
     scan_timeout: float = setting(
         2.0, "time without a scan after which localization_status is stale, s; 0: never", 0.0
     )
+    incident_seconds: float = setting(
+        30.0,
+        "last seconds of inputs and outputs that are saved when the pose is lost or revoked, or a "
+        "hint is refused; 0: none",
+        0.0,
+        600.0,
+    )
+    incident_folder: str = setting(
+        "", "folder of the saved incidents, at most 20; empty: that of the user"
+    )
     localizer: LocalizerConfig = field(default_factory=LocalizerConfig)
 
     def __post_init__(self) -> None:

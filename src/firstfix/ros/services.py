@@ -16,6 +16,7 @@ class Request(Enum):
     HINT = "propose a pose; the next scan verifies it"
     LOAD_MAP = "load a map from a file, by its path or a `file://` URL"
     SET_MAP = "use a map, and propose a pose in it"
+    SAVE_INCIDENT = "save the last seconds in a file; the message is its path"
     WAIT = "answer once the robot is localized, for behaviour trees"
 
 
@@ -55,6 +56,7 @@ _OWN_MAP = "with `yaml_filename`"
 _EMPTY = "std_srvs/Empty"
 _SEARCH = Service("reinitialize_global_localization", _EMPTY, Request.SEARCH)
 _UPDATE = Service("request_nomotion_update", _EMPTY, Request.UPDATE)
+_SAVE = Service("~/save_incident", "std_srvs/Trigger", Request.SAVE_INCIDENT)
 WAIT = Service("wait_until_localized", _EMPTY, Request.WAIT)
 
 
@@ -73,7 +75,7 @@ def ros2_services(config: NodeConfig) -> tuple[Service, ...]:
     """
     hint = Service("set_initial_pose", "nav2_msgs/SetInitialPose", Request.HINT)
     load = Service("~/load_map", "nav2_msgs/LoadMap", Request.LOAD_MAP, _OWN_MAP)
-    return (_SEARCH, _UPDATE, hint, *([load] if config.yaml_filename else []))
+    return (_SEARCH, _UPDATE, hint, _SAVE, *([load] if config.yaml_filename else []))
 
 
 def ros1_services(config: NodeConfig) -> tuple[Service, ...]:
@@ -96,5 +98,6 @@ def ros1_services(config: NodeConfig) -> tuple[Service, ...]:
         Service("global_localization", _EMPTY, Request.SEARCH),
         Service(own + _UPDATE.name, _EMPTY, Request.UPDATE, beside),
         Service(own + "set_map", "nav_msgs/SetMap", Request.SET_MAP, beside),
+        _SAVE,
         *([load] if config.yaml_filename else []),
     )

@@ -13,6 +13,8 @@ import rospy
 from rosbags.typesys import Stores, get_typestore
 
 _EMPTY = "std_srvs/Empty"
+_TRIGGER = "std_srvs/Trigger"
+_TRIGGER_MD5 = "937c9679a518e3a18d831e57125ea522"
 # Of an empty text.
 _EMPTY_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
 
@@ -48,7 +50,7 @@ def service_class(type_name: str) -> Any:
     Parameters
     ----------
     type_name : str
-        ``nav_msgs/Type``, or ``std_srvs/Empty``, whose package need not be installed.
+        ``nav_msgs/Type``, or ``Empty`` or ``Trigger`` of std_srvs, which need not be installed.
 
     Returns
     -------
@@ -57,6 +59,8 @@ def service_class(type_name: str) -> Any:
     """
     if type_name == _EMPTY:
         return Empty
+    if type_name == _TRIGGER:
+        return Trigger
     return getattr(nav_msgs.srv, type_name.partition("/")[2])
 
 
@@ -119,3 +123,14 @@ class Empty:
     _md5sum = _EMPTY_MD5
     _request_class = _Nothing
     _response_class = _Nothing
+
+
+class Trigger:
+    """``std_srvs/Trigger``."""
+
+    _type = _TRIGGER
+    _md5sum = _TRIGGER_MD5
+    _request_class = _Nothing
+    _response_class = genpy.dynamic.generate_dynamic(
+        "std_srvs/TriggerResponse", "bool success\nstring message\n"
+    )["std_srvs/TriggerResponse"]
