@@ -148,6 +148,7 @@ def _map(grid: OccupancyGrid, name: str) -> dict[str, Any]:
             "resolution": step * grid.resolution,
             "url": "",
         },
+        "changes": None,
     }
 
 
