@@ -7,6 +7,7 @@ from firstfix.ros.channels import (
     HYPOTHESES,
     INITIAL_POSE,
     LOCALIZED,
+    MAP_ID,
     MARKERS,
     PARTICLE_POSES,
     PARTICLES,
@@ -81,8 +82,8 @@ def test_one_name_has_one_type():
 @pytest.mark.parametrize("particles", [PARTICLES, PARTICLE_POSES])
 def test_each_mode_publishes_its_own_topics(particles):
     bootstrap = published_topics(NodeConfig(mode=Mode.BOOTSTRAP), particles)
-    assert set(bootstrap) == {INITIAL_POSE, HYPOTHESES, LOCALIZED, MARKERS, STATUS}
+    assert set(bootstrap) == {MAP_ID, INITIAL_POSE, HYPOTHESES, LOCALIZED, MARKERS, STATUS}
     full = published_topics(NodeConfig(mode=Mode.FULL), particles)
-    assert set(full) == {AMCL_POSE, TF, particles, HYPOTHESES, LOCALIZED, MARKERS, STATUS}
+    assert set(full) == {MAP_ID, AMCL_POSE, TF, particles, HYPOTHESES, LOCALIZED, MARKERS, STATUS}
     silent = NodeConfig(mode=Mode.FULL, tf_broadcast=False)
     assert TF not in published_topics(silent, particles)

@@ -115,6 +115,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "monitor.decided_cost": {"to": 0.002},
     "monitor.decided_views": {"to": 1, "in": "a loss", "with": {"belief.window": 1}},
     "belief.window": {"to": 1, "in": "rooms"},
+    "belief.memory": {"to": 0, "in": "rooms", "with": {"belief.window": 1}},
     "belief.first_shortlist": {"to": 1, "in": "rooms"},
     "belief.shortlist": {"to": 1, "in": "a loss"},
     "belief.places": {"to": 2, "in": "rooms"},
