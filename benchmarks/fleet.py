@@ -44,7 +44,7 @@ from firstfix.lab.worlds.floors import RandomFloor, floor_id, write_site
 from firstfix.site.query import SiteQuery
 
 CONCURRENT = 8
-ROUNDS = 3
+ROUNDS = 2
 
 
 def scans_in(floors: Sequence[RandomFloor], count: int) -> list[LaserScan]:

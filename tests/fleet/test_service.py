@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import signal
 import time
 from collections.abc import Callable
@@ -220,6 +221,54 @@ def test_metrics(server: FleetServer) -> None:
     assert values["firstfix_queue",] == 0
     assert values["process_resident_memory_bytes",] > 1e7
     assert values["firstfix_worker_memory_bytes", "0"] > 1e7
+
+
+def test_a_token_is_needed_but_for_the_state_and_the_page(
+    serve: Callable[..., FleetServer], rooms: Path
+) -> None:
+    server = serve(rooms, "--workers", "1", "--token", "open-sesame")
+    for path in ("/", "/static/fleet.js", "/static/fleet.css", "/healthz", "/openapi.json"):
+        assert server.http.get(path).status_code == 200, path
+    # Maps are not prepared yet, which is no error.
+    assert server.http.get("/readyz").json().keys() >= {"ready", "prepared"}
+    message = as_message(scan_of("first", POSE))
+    for path in ("/v1/maps", "/v1/robots", "/metrics"):
+        assert server.http.get(path).status_code == 401, path
+    assert server.http.post("/v1/locate", json=message).status_code == 401
+    bearer = {"authorization": "Bearer open-sesame"}
+    early = server.http.post("/v1/locate", json=message, headers=bearer)
+    assert early.status_code in {200, 503}
+    if early.status_code == 503:
+        assert early.json()["detail"].endswith("maps are not prepared yet. Try again later.")
+        assert early.headers["retry-after"] == "1"
+    server.stop()
+
+
+def test_the_document_has_all_routes(server: FleetServer) -> None:
+    described = server.http.get("/openapi.json").json()
+    schemas = described["components"]["schemas"]
+    used = set(re.findall(r"#/components/schemas/(\w+)", server.http.get("/openapi.json").text))
+    assert used == set(schemas)
+    for path, item in described["paths"].items():
+        for method in {"get", "post", "delete"} & set(item):
+            answer = server.http.request(method, path.replace("{robot}", "nobody"))
+            assert str(answer.status_code) in item[method]["responses"], (method, path)
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--host", "0.0.0.0"], "expected a --token"),  # noqa: S104
+        (["--token", "short"], "expected a token of at least 8 characters"),
+        (["--ray-address", "127.0.0.1:1"], "--ray-address is of no use without --engine ray."),
+    ],
+)
+def test_wrong_options_are_one_sentence(
+    cli: Callable[..., tuple[int, str]], rooms: Path, options: list[str], sentence: str
+) -> None:
+    status, text = cli("fleet", "serve", rooms, *options)
+    assert (status, text.count("\n")) == (2, 1)
+    assert text.startswith(f"firstfix: {sentence}")
 
 
 def test_the_end_leaves_no_process(serve: Callable[..., FleetServer], rooms: Path) -> None:

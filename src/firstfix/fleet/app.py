@@ -42,8 +42,8 @@ from firstfix.web.request_body import JSON, NPZ, media_type, read_body
 
 STATIC = Path(__file__).parent / "static"
 
-OPEN_PATHS = ("/", "/healthz", "/readyz")
-"""What load balancers ask, who have no token."""
+OPEN_PATHS = ("/", "/healthz", "/readyz", "/openapi.json")
+"""The page, and what load balancers ask, who have no token."""
 
 # A gateway may send the scans of all robots from one address.
 RATE_HZ, BURST = 500.0, 1000.0

@@ -34,7 +34,8 @@ async function show() {
     $("state").textContent = `${health.ready ? "Ready" : "Preparing maps"}: ${health.prepared} of ` +
       `${health.maps} maps prepared, ${health.faults} unusable, ${health.robots} robots, ` +
       `${health.waiting} queries run or wait. Version ${health.version}.`;
-    const [maps, robots, api] = await Promise.all(["/v1/maps", "/v1/robots", "/openapi.json"].map(get));
+    const maps = await get("/v1/maps"); // asks for the token, if one is needed
+    const [robots, api] = await Promise.all(["/v1/robots", "/openapi.json"].map(get));
     $("maps").replaceChildren(...maps.maps.map((map) =>
       row([map.map_id, map.fault ?? (map.ready ? "ready" : "is prepared")], map.fault && "fault")));
     $("robots").textContent = robots.robots.join(", ") || "None has reported.";

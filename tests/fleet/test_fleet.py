@@ -1,0 +1,97 @@
+"""Losses of workers and broken maps, with an engine that fails as it is told."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fleet_lab import scan_of
+
+from firstfix.core.se2 import SE2
+from firstfix.fleet import fleet as fleet_module
+from firstfix.fleet.engine import WorkerLostError
+from firstfix.fleet.fleet import Fleet, NotReadyError, UnknownMapError
+from firstfix.fleet.jobs import Prepare, ShardedSite, run_job, spread
+from firstfix.io.maps.site_yaml import read_site
+from firstfix.site.query import SiteQuery
+
+POSE = SE2(3.9, 1.7, 0.6)
+
+
+class Here:
+    """An engine in this process; loses the jobs that it is told to lose."""
+
+    def __init__(self, sharded: ShardedSite) -> None:
+        self._sites = [sharded.open(i) for i in range(len(sharded.shards))]
+        self.losses: list[Any] = []
+
+    async def ask(self, worker: int, job: Any) -> Any:
+        if self.losses and self.losses.pop(0)(job):
+            raise WorkerLostError
+        return run_job(job, self._sites[worker])
+
+    def close(self) -> None:
+        """Nothing is to be ended."""
+
+
+@pytest.fixture
+def here(rooms: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Here, Fleet]:
+    shards = spread(read_site(rooms).maps, 3)
+    prepared = tmp_path_factory.getbasetemp() / "fleet-cache" / "sites"
+    engine = Here(ShardedSite(rooms, shards, prepared, 10**9))
+    return engine, Fleet(engine, shards)
+
+
+@pytest.fixture(autouse=True)
+def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fleet_module, "PAUSES_S", (0.0, 0.0, 0.0))
+
+
+def test_shards_are_all_maps_once_and_of_one_size(rooms: Path) -> None:
+    maps = read_site(rooms).maps
+    for workers in (1, 2, 3, 50):
+        shards = spread(maps, workers)
+        assert sorted(name for shard in shards for name in shard) == sorted(m.id for m in maps)
+        assert len(shards) == min(workers, len(maps))
+        assert all(shards)
+    assert spread(maps, 2) == spread(tuple(reversed(maps)), 2)
+
+
+def test_a_lost_job_is_given_again(here: tuple[Here, Fleet]) -> None:
+    engine, fleet = here
+    asyncio.run(fleet.prepare())
+    engine.losses = [lambda _: True, lambda _: True, lambda _: False]
+    result = asyncio.run(fleet.locate(SiteQuery.of(scan_of("second", POSE))))
+    assert (result.verdict.value, result.map_id) == ("UNIQUE", "second")
+    assert fleet.lost_jobs == 2
+
+
+def test_without_a_part_of_the_maps_there_is_no_answer(here: tuple[Here, Fleet]) -> None:
+    engine, fleet = here
+    asyncio.run(fleet.prepare())
+    engine.losses = [lambda _: True] * 100
+    with pytest.raises(NotReadyError, match="its worker was lost"):
+        asyncio.run(fleet.locate(SiteQuery.of(scan_of("second", POSE))))
+
+
+def test_a_map_that_ends_every_worker_is_named(here: tuple[Here, Fleet]) -> None:
+    engine, fleet = here
+    engine.losses = [lambda job: isinstance(job, Prepare) and job.map_id == "first"] * 100
+    asyncio.run(fleet.prepare())
+    assert fleet.is_ready
+    assert set(fleet.faults) == {"broken", "first"}
+    assert fleet.faults["first"].endswith("each worker that prepares it is lost.")
+    engine.losses = []
+    result = asyncio.run(fleet.locate(SiteQuery.of(scan_of("second", POSE))))
+    assert result.map_id == "second"
+
+
+def test_queries_wait_for_preparation_and_known_maps(here: tuple[Here, Fleet]) -> None:
+    _, fleet = here
+    query = SiteQuery.of(scan_of("second", POSE))
+    with pytest.raises(NotReadyError, match="5 of 5 maps are not prepared yet"):
+        asyncio.run(fleet.locate(query))
+    with pytest.raises(UnknownMapError, match="There is no map 'attic'"):
+        asyncio.run(fleet.locate(query, "attic"))
