@@ -98,6 +98,10 @@ def dds(
     map_file: Annotated[
         Path | None, typer.Option("--map", help="Map to load; without it, the topic `map`.")
     ] = None,
+    site: Annotated[
+        Path | None,
+        typer.Option(help="site.yaml or folder of maps, in one of which the robot is."),
+    ] = None,
     mode: Annotated[
         str | None,
         typer.Option(help="`bootstrap`: find the robot and start an AMCL; `full`: also track it."),
@@ -137,6 +141,7 @@ def dds(
 
     names = names_from(remap or [], name, namespace)
     options: dict[str, Any] = {"mode": mode, "base_frame_id": base_frame}
+    options["site"] = None if site is None else str(site)
     options["yaml_filename"] = None if map_file is None else str(map_file)
     config = settings_from(
         node=names.node,

@@ -58,6 +58,7 @@ class Channel(Enum):
     KIDNAPPED = "kidnapped"
     RESET = "reinitialize_global_localization"
     UPDATE = "request_nomotion_update"
+    MAP_HINT = "map_hint"
     INPUT = "input"
 
 
@@ -102,6 +103,9 @@ MAP_ID = Topic(
     "std_msgs/String",
     Delivery.LATCHED,
     "the name of the map in use, before any pose in it",
+)
+MAP = Topic(
+    "map", "nav_msgs/OccupancyGrid", Delivery.LATCHED, "the map in use, of a `site`; after its name"
 )
 STATUS = Topic(
     "localization_status",
@@ -148,7 +152,11 @@ def subscribed_topics(config: NodeConfig) -> dict[Channel, Topic]:
             "kidnapped", "std_msgs/Bool", reliable, "true: the robot was lifted; false: set down"
         ),
     }
-    if not config.yaml_filename:
+    if config.site:
+        topics[Channel.MAP_HINT] = Topic(
+            "map_hint", "std_msgs/String", reliable, "the map that a lift names; a prior"
+        )
+    elif not config.yaml_filename:
         meaning = "the map, unless `yaml_filename` names a file"
         topics[Channel.MAP] = Topic(config.map_topic, grid, Delivery.LATCHED, meaning)
     return topics
@@ -210,7 +218,8 @@ def published_topics(config: NodeConfig, particles: Topic) -> tuple[Topic, ...]:
     tuple of Topic
         All of them.
     """
+    named = (MAP_ID, replace(MAP, name=config.map_topic)) if config.site else (MAP_ID,)
     if config.mode is Mode.BOOTSTRAP:
-        return MAP_ID, INITIAL_POSE, HYPOTHESES, MARKERS, LOCALIZED, STATUS
+        return (*named, INITIAL_POSE, HYPOTHESES, MARKERS, LOCALIZED, STATUS)
     moved = [TF] if config.tf_broadcast else []
-    return (MAP_ID, AMCL_POSE, particles, HYPOTHESES, MARKERS, LOCALIZED, STATUS, *moved)
+    return (*named, AMCL_POSE, particles, HYPOTHESES, MARKERS, LOCALIZED, STATUS, *moved)

@@ -24,7 +24,15 @@ from firstfix.io.ros_messages.incoming import (
 from firstfix.io.ros_messages.robot_frames import RobotFrames
 from firstfix.io.ros_messages.tf_buffer import LookupFailure
 from firstfix.io.saved_pose import map_key
-from firstfix.localizer.inputs import Input, NewMap, NoMotionUpdate, PoseHint, PositionFix, Reset
+from firstfix.localizer.inputs import (
+    Input,
+    MapHint,
+    NewMap,
+    NoMotionUpdate,
+    PoseHint,
+    PositionFix,
+    Reset,
+)
 from firstfix.ros.channels import SENSORS, Channel
 from firstfix.ros.exact_stamps import ExactStamps
 from firstfix.ros.node_config import NodeConfig
@@ -126,11 +134,14 @@ class MessageConverter:
             return self._convert_hint(message)
         if channel is Channel.INPUT:
             return self._convert_input(message)
-        if channel is Channel.RESET:
-            return [self._reset()]
-        if channel is Channel.UPDATE:
-            return [NoMotionUpdate(self._now)]
+        if channel in (Channel.MAP_HINT, Channel.RESET, Channel.UPDATE):
+            return [self._request(channel, message)]
         return self._convert_event(channel, message)
+
+    def _request(self, channel: Channel, message: Any) -> Input:
+        if channel is Channel.MAP_HINT:
+            return MapHint(self._now, str(message.data), "map_hint")
+        return self._reset() if channel is Channel.RESET else NoMotionUpdate(self._now)
 
     def use_map(self, given: NewMap) -> list[Input]:
         """Return a map with its name, unless it is the one in use: map servers repeat theirs."""

@@ -22,7 +22,7 @@ from firstfix.io.maps.zones import load_zones
 from firstfix.io.ros_messages.outgoing import occupancy_grid
 from firstfix.localizer.inputs import Input, NewMap, Reset
 from firstfix.localizer.localizer import Localizer
-from firstfix.localizer.outputs import Output
+from firstfix.localizer.outputs import MapSwitched, Output
 from firstfix.localizer.precompile import precompile
 from firstfix.ros.channels import SENSORS, Channel, subscribed_topics
 from firstfix.ros.exact_stamps import ExactStamps
@@ -35,8 +35,10 @@ from firstfix.ros.output_publisher import OutputPublisher
 from firstfix.ros.pose_memory import PoseMemory
 from firstfix.ros.services import LoadResult, Request
 from firstfix.ros.transport import Severity, Transport
+from firstfix.site.floors import AnyLocalizer, SiteLocalizer
+from firstfix.site.site import Site
 
-Watcher = Callable[[Input, list[Output], Localizer], None]
+Watcher = Callable[[Input, list[Output], AnyLocalizer], None]
 
 # A warning on one subject is repeated after this time at the earliest, s.
 _REPEAT_S = 10.0
@@ -75,7 +77,8 @@ class Node:
             IncidentFolder(incident_folder(config.incident_folder)),
             lambda text: self.warn_throttled("incidents", text),
         )
-        self._localizer = Localizer(config.localizer, cache_folder())
+        self._site: Site | None = None
+        self._localizer = self._new_localizer()
         self._prior: Prior | None = None  # of the first search
         self._map: NewMap | None = None  # of yaml_filename, then the one in use
         self._logged_at: dict[str, float] = {}
@@ -195,6 +198,9 @@ class Node:
         return {"result": int(LoadResult.SUCCESS), "map": grid}
 
     def _load_own_map(self) -> None:
+        if self._config.site:
+            self._site = Site.load(self._config.site, cache_folder() / "sites")
+            self._localizer = self._new_localizer()
         if self._config.yaml_filename:
             self._map = map_from(Path(self._config.yaml_filename))
             self._prior = self._prior_of_zones(self._map.grid)
@@ -228,6 +234,10 @@ class Node:
 
     def _prepare(self) -> None:
         precompile(self._config.localizer.amcl)
+        if self._site is not None:
+            self._site.prepare()
+            for fault in self._site.faults.values():
+                self.warn_throttled(fault, fault)
         if self._map is not None:
             stamp, prior = self._map.stamp, self._prior
             self._handle_all(self._converter.use_map(self._map))
@@ -264,26 +274,40 @@ class Node:
         except Exception:
             self._replace_localizer(given)
             raise
-        if isinstance(given, NewMap):
+        if isinstance(given, NewMap) and self._site is None:
             self._map = given
             self._publisher.publish_map_id(given.map_id)
         self._publish(given, outputs)
 
+    def _new_localizer(self) -> AnyLocalizer:
+        if self._site is None:
+            return Localizer(self._config.localizer, cache_folder())
+        return SiteLocalizer(self._site, self._config.localizer, cache_folder())
+
     def _replace_localizer(self, given: Input) -> None:
         """Start over on the same map: an exception may have left the localizer half-changed."""
-        self._localizer = Localizer(self._config.localizer, cache_folder())
+        self._localizer = self._new_localizer()
         text = "the localizer failed and was reset: searching the whole map again"
         self.warn_throttled("reset", text, Severity.ERROR)
         if isinstance(given, NewMap):
             self._converter.restore_map()
-        if self._map is not None:
+        if self._map is not None and self._site is None:
             known = replace(self._map, stamp=given.stamp)
             self._publish(known, self._localizer.handle(known))
 
     def _publish(self, given: Input, outputs: list[Output]) -> None:
         self._publisher.publish(outputs, self._localizer.particles)
         self._memory.keep(outputs)
-        self.incidents(given, outputs, self._localizer)
+        for output in outputs:
+            if isinstance(output, MapSwitched):
+                named = NewMap(output.stamp, output.grid, output.map_id)
+                self._memory.hint_after(named)  # whose poses it keeps; a site needs no hint
+                self._tell(named, [])
+        self._tell(given, outputs)
+
+    def _tell(self, given: Input, outputs: list[Output]) -> None:
+        if isinstance(self._localizer, Localizer):  # an incident has one map
+            self.incidents(given, outputs, self._localizer)
         for watch in self._watchers:
             watch(given, outputs, self._localizer)
 

@@ -39,6 +39,11 @@ class NodeConfig:
         "bootstrap: publish initialpose for a separate AMCL; full: replace AMCL",
     )
     yaml_filename: str = setting("", "map file to load; empty: use map_topic")
+    site: str = setting(
+        "",
+        "site.yaml or folder of maps, in one of which the robot is; the node publishes that map; "
+        "empty: one map",
+    )
     map_id: str = setting(
         "",
         "name of the first map, published on map_id; empty: the name of its file, or a hash of its "
@@ -122,6 +127,11 @@ class NodeConfig:
                 "0.1 1.8."
             )
         given_poses(self.laser_pose)
+        if self.site and self.yaml_filename:
+            raise InputError(
+                "site and yaml_filename are both set, but a site has maps of its own. Leave one of "
+                "them empty."
+            )
         if self.zones and not self.yaml_filename:
             raise InputError(
                 "zones are in a file beside the map, but yaml_filename is empty. Set it, or leave "

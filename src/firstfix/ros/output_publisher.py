@@ -13,6 +13,7 @@ from firstfix.io.ros_messages.incoming import StampedTransform, to_pose
 from firstfix.io.ros_messages.outgoing import (
     Level,
     diagnostics,
+    occupancy_grid,
     particle_cloud,
     place_markers,
     pose_array,
@@ -22,6 +23,7 @@ from firstfix.io.ros_messages.outgoing import (
 from firstfix.localizer.outputs import (
     Hypotheses,
     InitialPose,
+    MapSwitched,
     MotionRequest,
     Output,
     Status,
@@ -33,6 +35,7 @@ from firstfix.ros.channels import (
     HYPOTHESES,
     INITIAL_POSE,
     LOCALIZED,
+    MAP,
     MAP_ID,
     MARKERS,
     STATUS,
@@ -99,7 +102,9 @@ class OutputPublisher:
             # Before the status, which contains it.
             self._motion = next((o for o in outputs if isinstance(o, MotionRequest)), None)
         for output in outputs:
-            if isinstance(output, InitialPose):
+            if isinstance(output, MapSwitched):
+                self.publish_map(output)
+            elif isinstance(output, InitialPose):
                 if self._config.mode is Mode.BOOTSTRAP:
                     self._publish_initial(output)
             elif isinstance(output, TrackedPose):
@@ -112,6 +117,13 @@ class OutputPublisher:
     def publish_map_id(self, map_id: str) -> None:
         """Publish the name of the map in use."""
         self._transport.publish(MAP_ID, self._transport.make("std_msgs/String", data=map_id))
+
+    def publish_map(self, switched: MapSwitched) -> None:
+        """Publish the name of the map that all later poses are in, then the map."""
+        self.publish_map_id(switched.map_id)
+        topic = replace(MAP, name=self._config.map_topic)
+        grid = occupancy_grid(self._transport.make, switched.stamp, self._map, switched.grid)
+        self._transport.publish(topic, grid)
 
     def is_own(self, message: Any) -> bool:
         """Return whether an initial pose was published here."""

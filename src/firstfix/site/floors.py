@@ -31,8 +31,8 @@ from firstfix.localizer.outputs import InitialPose, MapSwitched, Output, Status,
 from firstfix.localizer.scan_queue import ScanQueue
 from firstfix.localizer.states import State
 from firstfix.site.arrival import Candidate, MapLocalizers, confirm
-from firstfix.site.lifts import Lift, lift_at, sees_out, sees_same_floor, without_cabin
-from firstfix.site.map_belief import MapBelief, begin_maps, brings_news, look
+from firstfix.site.lifts import KINDS, Lift, lift_at, sees_out, sees_same_floor, without_cabin
+from firstfix.site.map_belief import MapBelief, begin_maps, brings_news, look, predicted
 from firstfix.site.query import SitePrior
 from firstfix.site.site import Site
 from firstfix.site.site_search import SiteSearch
@@ -133,6 +133,11 @@ class SiteLocalizer:
         return None if self._localizer is None else self._localizer.matcher
 
     @property
+    def view(self) -> View | None:
+        """The view that the localizer of the map in use has used last; None before the first."""
+        return None if self._localizer is None else self._localizer.view
+
+    @property
     def changes(self) -> ChangeCounter | None:
         """What scans contradict in the map in use; None unless `ChangesConfig` keeps days."""
         return None if self._localizer is None else self._localizer.changes
@@ -193,6 +198,7 @@ class SiteLocalizer:
             return self._start_search(given.stamp, "odometry jumped in a lift: searching all maps")
         if has_jumped and self._phase is _Phase.SEARCHING:
             self._search = self._new_search(None)
+            self._hinted = None
         if self._tracking is None:
             return self._use_next_view()
         return [*self._of_localizer(given, self._tracking), *self._use_next_view()]
@@ -222,7 +228,9 @@ class SiteLocalizer:
             reason = f"{source} says that this is {named}: the next view verifies it"
             return [self._open(given.stamp, reason)]
         reason = f"{source} says that this is {named}: searching there first"
-        return self._start_search(given.stamp, reason, {named: None})
+        said = self._start_search(given.stamp, reason, {named: None})
+        self._hinted = named
+        return said
 
     def _use_next_view(self) -> list[Output]:
         view = self._scans.pop()
@@ -254,6 +262,9 @@ class SiteLocalizer:
             return []
         best = result.best
         if result.verdict is Verdict.UNIQUE and best is not None and result.map_id is not None:
+            if not self._is_clear(result.map_id, best.pose, view):
+                reason = f"{result.map_id} fits best, but another floor differs in little"
+                return [self._open(view.stamp, reason)]
             found = self._localizers.propose(
                 result.map_id, best.pose, view, "the search of all maps"
             )
@@ -263,12 +274,28 @@ class SiteLocalizer:
             self._state = State.SEARCHING
         return [self._status(view.stamp, result.reason)]
 
+    def _is_clear(self, map_id: str, T_map_base: SE2, view: View) -> bool:
+        """Tell whether a view fits much worse at the same place of the floors above and below."""
+        for transition in self.site.transitions:
+            for end in transition.ends:
+                if end.map_id == map_id and transition.kind in KINDS and self._hinted is None:
+                    lift = Lift(transition, end.pose)
+                    belief = begin_maps(self._places(lift, T_map_base), view)
+                    if belief is not None and not belief.is_clear(map_id):
+                        return False
+        return True
+
     def _ride(self, view: View) -> list[Output]:
         """Weigh the floors of a lift by views that see out of it."""
         lift = self._lift
         assert lift is not None  # noqa: S101 - every way into this phase brings one
         T_map_base = self._T_map_odom @ view.T_odom_base
-        if not sees_out(view, lift, T_map_base):
+        if self._belief is not None:
+            best = self._belief.most_likely
+            lift, T_map_base = lift.seen_from(best), predicted(self._belief, best, view)
+            self._lift, self._T_map_odom = lift, T_map_base @ view.T_odom_base.inverse()
+        if lift.holds(T_map_base) and not sees_out(view, lift, T_map_base):
+            self._belief = self._candidate = self._hinted = None
             reason = f"in {lift.transition.id}, which may move: waiting for its door to open"
             return [self._open(view.stamp, reason)]
         outside = without_cabin(view, lift, T_map_base)
@@ -321,8 +348,7 @@ class SiteLocalizer:
             return outputs
         self._map_id = candidate.map_id
         if rode and self._lift is not None:
-            here = [e for e in self._lift.transition.ends if e.map_id == self._map_id]
-            self._lift = Lift(self._lift.transition, here[0].pose)
+            self._lift = self._lift.seen_from(self._map_id)
         return [MapSwitched(view.stamp, self._map_id, self.site.grid(self._map_id)), *outputs]
 
     def _follow(self, view: View, *, was_blind: bool) -> list[Output]:
@@ -412,6 +438,10 @@ class SiteLocalizer:
 
     def _status(self, stamp: float, reason: str) -> Status:
         return Status(stamp, self.state, reason)
+
+
+AnyLocalizer = Localizer | SiteLocalizer
+"""A localizer of one map, or of many: both have the same inputs, outputs and properties."""
 
 
 def _in_words(belief: MapBelief) -> str:

@@ -47,6 +47,15 @@ class Lift:
     transition: Transition
     T_map_lift: SE2
 
+    def holds(self, T_map_base: SE2) -> bool:
+        """Tell whether a robot stands in it."""
+        return self.T_map_lift.distance_to(T_map_base) <= _INSIDE_M
+
+    def seen_from(self, map_id: str) -> Lift:
+        """Return the same lift on another of its floors."""
+        end = next(end for end in self.transition.ends if end.map_id == map_id)
+        return Lift(self.transition, end.pose)
+
     def leads_to(self, map_id: str) -> bool:
         """Tell whether a map is at one of its ends."""
         return any(end.map_id == map_id for end in self.transition.ends)

@@ -14,13 +14,14 @@ from firstfix.belief.config import BeliefConfig
 from firstfix.belief.evidence import log_likelihoods, shares
 from firstfix.belief.joint import joint_log_likelihoods, power_of
 from firstfix.belief.judge import EXPLAINED_COST, SECOND_LOOK_M, SECOND_LOOK_RAD
-from firstfix.belief.planar import in_cells, to_map
+from firstfix.belief.planar import compose, in_cells, to_map
 from firstfix.belief.prior import FLOOR
-from firstfix.belief.tracks import BEAMS, Tracks, at_rest, follow, look_again
+from firstfix.belief.tracks import BEAMS, CAREFUL_BEAMS, Tracks, at_rest, follow, look_again
 from firstfix.belief.view import Observation, View, costs, settle
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS
+from firstfix.global_localization.verify import verify
 
 SURE_SHARE = 0.99
 """Share of the probability at which a map is the only one that explains a view."""
@@ -31,6 +32,12 @@ _TURNS_RAD = (0.0, math.radians(-8.0), math.radians(8.0))
 
 # Places on each floor that are followed.
 _PLACES = 4
+
+# Floors of one building are alike but for a few things, and things are moved. So a floor must be
+# ahead by this factor even without the part of each view that speaks for it most: of so many parts
+# of a view with equal numbers of beams, so many are left out.
+_CLEAR_FACTOR = 10.0
+_PARTS, _LEFT_OUT = 12, 3
 
 # A floor whose map cannot be used may be the one: it is taken to fit as right maps do, nats.
 _RIGHT_MAP_COST = 0.8
@@ -67,6 +74,17 @@ class Floor:
     def cost(self) -> float:
         """Mean cost of a beam of the newest view at the best pose, nats."""
         return float(self.tracks.costs[self._best, -1])
+
+    def costs_of_parts(self) -> NDArray[np.float64]:
+        """Return the mean cost of a beam in each part of each view, shape (views, parts), nats."""
+        poses = self.tracks.poses[self._best]
+        return np.array(
+            [
+                _costs_of_parts(poses[v], seen, self.fields)
+                for v, seen in enumerate(self.window)
+                if seen.hits >= _PARTS
+            ]
+        ).reshape(-1, _PARTS)
 
     @property
     def log_likelihood(self) -> float:
@@ -126,6 +144,27 @@ class MapBelief:
         step = since.T_odom_base.inverse() @ newest.T_odom_base
         has_moved = math.hypot(step.x, step.y) >= SECOND_LOOK_M or abs(step.yaw) >= SECOND_LOOK_RAD
         return map_id if has_moved or self.hinted == map_id else None
+
+    def is_clear(self, map_id: str) -> bool:
+        """Tell whether a map is ahead of all others not only by one or two things.
+
+        Parameters
+        ----------
+        map_id : str
+            One of the maps.
+        """
+        chosen = self.floors[map_id].costs_of_parts()
+        power = power_of(self.floors[map_id].window)
+        for name, floor in self.floors.items():
+            if name == map_id:
+                continue
+            ahead = floor.costs_of_parts() - chosen
+            kept = np.argsort(ahead, axis=1)[:, : _PARTS - _LEFT_OUT]
+            mean = [np.take_along_axis(c, kept, axis=1).mean() for c in (chosen, chosen + ahead)]
+            own, other = log_likelihoods(np.array(mean), power)
+            if own - other < math.log(_CLEAR_FACTOR):
+                return False
+        return True
 
     @property
     def is_refuted(self) -> bool:
@@ -200,6 +239,13 @@ def look(belief: MapBelief, view: View) -> MapBelief:
     return _judged(replace(belief, floors=floors), view)
 
 
+def predicted(belief: MapBelief, map_id: str, view: View) -> SE2:
+    """Return where a robot on one of the maps is at a later view, by odometry."""
+    floor = belief.floors[map_id]
+    last = floor.window[-1].views[-1].T_odom_base
+    return floor.T_map_base @ (last.inverse() @ view.T_odom_base)
+
+
 def brings_news(belief: MapBelief, view: View) -> bool:
     """Return whether a view is taken far enough from the last one to be weighed."""
     last = next(iter(belief.floors.values())).window[-1].views[-1]
@@ -211,6 +257,7 @@ def _judged(belief: MapBelief, view: View) -> MapBelief:
     probabilities, best = belief.probabilities, belief.most_likely
     explains = belief.floors[best].cost <= EXPLAINED_COST
     is_sure = explains and probabilities[best] >= SURE_SHARE and _is_verified(belief, best)
+    is_sure = is_sure and (best == belief.hinted or belief.is_clear(best))
     since = belief.sure_since
     if not is_sure:
         since = None
@@ -251,3 +298,13 @@ def _look(floor: Floor, view: View, *, rests: bool) -> Floor:
     most = BeliefConfig().window
     window, tracks = window[-most:], tracks.over(slice(-most, None))
     return Floor(fields, window, look_again(tracks, window, fields))
+
+
+def _costs_of_parts(
+    pose: NDArray[np.float64], seen: Observation, fields: MapFields
+) -> NDArray[np.float64]:
+    sensor = seen.sensor
+    at = compose(pose[None], sensor.T_base_laser)
+    beams = sensor.beams.thinned(CAREFUL_BEAMS)
+    parts = np.array_split(np.arange(len(beams)), _PARTS)
+    return np.array([verify(at, beams.take(part), fields).scores[0] for part in parts])

@@ -15,8 +15,8 @@ import aiomqtt
 
 from firstfix.core.errors import InputError
 from firstfix.localizer.inputs import Input
-from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Output, TrackedPose
+from firstfix.site.floors import AnyLocalizer
 from firstfix.vda5050.actions import Actions
 from firstfix.vda5050.broker import Broker
 from firstfix.vda5050.encoder import Encoder
@@ -101,7 +101,7 @@ class Bridge:
         """Set the function that takes inputs for the localizer, from any thread."""
         self._give = give
 
-    def __call__(self, given: Input, outputs: list[Output], localizer: Localizer) -> None:
+    def __call__(self, given: Input, outputs: list[Output], localizer: AnyLocalizer) -> None:
         """Take over what an input led to; called by the localizer's thread."""
         now = time.monotonic()
         with self._lock:

@@ -11,9 +11,9 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.io.saved_pose import map_key
 from firstfix.localizer.inputs import Input, NewMap
-from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Hypotheses, MotionRequest, Output, Status, TrackedPose
 from firstfix.localizer.states import State
+from firstfix.site.floors import AnyLocalizer
 from firstfix.web.snapshot import (
     ActiveMap,
     AmclEstimate,
@@ -94,7 +94,7 @@ class SnapshotStore:
         # A file name may have bytes that are not UTF-8, and JSON cannot have them.
         self._map_name = name.encode(errors="replace").decode()
 
-    def __call__(self, given: Input, outputs: list[Output], localizer: Localizer) -> None:
+    def __call__(self, given: Input, outputs: list[Output], localizer: AnyLocalizer) -> None:
         """Store the outputs for an input; called by the localizer's thread."""
         self._timing.end_input(given, outputs, self._snapshot.state)
         with self._lock:
@@ -111,7 +111,7 @@ class SnapshotStore:
             self._notify()
         self._timing.start_input()
 
-    def _store_map(self, given: NewMap, localizer: Localizer) -> None:
+    def _store_map(self, given: NewMap, localizer: AnyLocalizer) -> None:
         if localizer.matcher is not None:
             key = map_key(given.grid)
             active_map = ActiveMap(
@@ -119,7 +119,7 @@ class SnapshotStore:
             )
             self._snapshot = replace(self._snapshot, map=active_map)
 
-    def _store_output(self, output: Output, localizer: Localizer) -> None:
+    def _store_output(self, output: Output, localizer: AnyLocalizer) -> None:
         if isinstance(output, TrackedPose):
             self._snapshot = replace(
                 self._snapshot,
@@ -159,7 +159,7 @@ class SnapshotStore:
             **cleared,
         )
 
-    def _cloud(self, localizer: Localizer, T_map_base: SE2) -> ParticleCloud | None:
+    def _cloud(self, localizer: AnyLocalizer, T_map_base: SE2) -> ParticleCloud | None:
         before, particles = self._snapshot.particles, localizer.particles
         if particles is None:
             return None
@@ -167,7 +167,7 @@ class SnapshotStore:
             return before
         return ParticleCloud(particles, T_map_base)
 
-    def _registered(self, localizer: Localizer, T_map_base: SE2) -> RegisteredScan | None:
+    def _registered(self, localizer: AnyLocalizer, T_map_base: SE2) -> RegisteredScan | None:
         view = localizer.view
         return self._snapshot.scan if view is None else RegisteredScan(view.scans, T_map_base)
 
