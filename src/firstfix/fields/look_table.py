@@ -114,11 +114,13 @@ def build_look_table(
     standing = seen_free & (clearance > max(1, round(_KEPT_M / resolution)))
     rows, columns, samples = _label(standing, stride, max(1.0, _LEAST_SHARE * stride**2))
     directions = _BETWEEN * LOOK_DIRECTIONS
-    near = np.empty((directions, len(rows)), np.uint8)
-    away = np.empty((directions, len(rows)), np.uint8)
+    low = np.full((LOOK_DIRECTIONS, len(rows)), FARTHEST, np.uint8)
+    high = np.zeros((LOOK_DIRECTIONS, len(rows)), np.uint8)
     for upright in (True, False):
         walls = np.ascontiguousarray(occupied if upright else occupied.T)
+        height = len(walls)
         free = np.pad(~walls, 1, constant_values=True).view(np.uint8)
+        del walls
         starts, order, places = _bands(rows if upright else columns, samples, stride, upright)
         found = np.empty((2, len(rows)), np.uint8)
         for i in range(directions):
@@ -128,18 +130,19 @@ def build_look_table(
                 continue
             if not upright:
                 along, across = across, along
-            offsets = np.floor(np.arange(len(walls)) * (across / along) + 0.5).astype(np.int64)
+            offsets = np.floor(np.arange(height) * (across / along) + 0.5).astype(np.int64)
             far = np.uint16(math.ceil(REACH_M / resolution * abs(along)) + 1)
             scale = resolution / abs(along) / UNIT_M
             step = -1 if along > 0.0 else 1
             _sweep(free, offsets, step, far, stride, starts, places, scale, found)
-            near[i, order], away[i, order] = found
-    # A direction of the table covers the sweeps halfway to its neighbours.
-    every = np.arange(0, directions, _BETWEEN)
-    covered = [every, every - 1, (every + 1) % directions]
-    low = np.minimum.reduce([near[i] for i in covered])
-    high = np.maximum.reduce([away[i] for i in covered])
-    return LookTable(stride, rows, columns, np.ascontiguousarray(np.stack([low.T, high.T], axis=1)))
+            # A direction of the table covers the sweeps halfway to its neighbours.
+            for d in {i // _BETWEEN, -(-i // _BETWEEN) % LOOK_DIRECTIONS}:
+                low[d, order] = np.minimum(low[d, order], found[0])
+                high[d, order] = np.maximum(high[d, order], found[1])
+        del free, places
+    bounds = np.empty((len(rows), 2, LOOK_DIRECTIONS), np.uint8)
+    bounds[:, 0], bounds[:, 1] = low.T, high.T
+    return LookTable(stride, rows, columns, bounds)
 
 
 def _bands(
