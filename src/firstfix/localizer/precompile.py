@@ -16,8 +16,11 @@ from firstfix.core.grid import FREE, OCCUPIED, OccupancyGrid
 from firstfix.core.odometry import Odometry
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import MapFields
 from firstfix.fields.raycast import expected_ranges
-from firstfix.global_localization.config import Method
+from firstfix.global_localization.beams import usable_beams
+from firstfix.global_localization.config import MAX_POSES, Method
+from firstfix.global_localization.look import find_places
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.inputs import NewMap, PoseHint, Reset
@@ -59,6 +62,7 @@ def precompile(config: AmclConfig | None = None, methods: Iterable[Method] = ())
     _search_again(localizer, grid)
     for method in methods:
         ScanMatcher(grid, method=method).locate(scan_of(grid, _HERE))
+    _search_as_in_a_large_map(grid)
 
 
 def _search_again(localizer: Localizer, grid: OccupancyGrid) -> None:
@@ -68,6 +72,11 @@ def _search_again(localizer: Localizer, grid: OccupancyGrid) -> None:
         localizer.handle(Reset(stamp) if i == _SCANS else PoseHint(stamp, _HERE))
         localizer.handle(Odometry(stamp, SE2(0.05 * i, 0.0, 0.0)))
         localizer.handle(replace(scan_of(grid, _HERE), range_max=_SHORT_RANGE, stamp=stamp))
+
+
+def _search_as_in_a_large_map(grid: OccupancyGrid) -> None:
+    beams = usable_beams(scan_of(grid, _HERE))
+    find_places(beams, MapFields(grid, most_positions=0), 1, MAX_POSES)
 
 
 def small_room() -> OccupancyGrid:
