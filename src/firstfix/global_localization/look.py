@@ -42,7 +42,7 @@ from firstfix.global_localization.search import (
 BEAMS = 32
 ENDPOINT_BEAMS = 24
 
-BLOCKS_KEPT = 40_000
+BLOCKS_KEPT = 120_000
 """Blocks and eighths of a turn of all maps together whose end points are compared."""
 
 PLACES_KEPT = 4_000
