@@ -35,7 +35,7 @@ from firstfix.core.scan import LaserScan
 from firstfix.fields.cache import cache_folder
 from firstfix.fleet.engine import Engine
 from firstfix.fleet.fleet import Fleet
-from firstfix.fleet.jobs import ShardedSite, spread
+from firstfix.fleet.jobs import ShardedSite, parts_for, spread
 from firstfix.fleet.local_engine import LocalEngine
 from firstfix.io.maps.site_yaml import read_site
 from firstfix.lab.simulation.lidar import Lidar
@@ -83,13 +83,15 @@ async def measure(
     name: str, site: Path, scans: Sequence[LaserScan], workers: int
 ) -> tuple[float, float]:
     """Return answers in a second, and processor time of the busiest worker for an answer."""
-    shards = spread(read_site(site).maps, workers)
-    sharded = ShardedSite(site, shards, cache_folder() / "sites", 2 * 10**9)
+    maps = read_site(site).maps
+    shards = spread(maps, parts_for(len(maps), workers))
+    copies = workers // len(shards)
+    sharded = ShardedSite(site, shards * copies, cache_folder() / "sites", 2 * 10**9)
     engine = engine_of(name, sharded)
     try:
-        fleet = Fleet(engine, shards)
+        fleet = Fleet(engine, shards, copies)
         await fleet.prepare()
-        await rate(fleet, scans[:CONCURRENT])
+        await rate(fleet, [*scans[:CONCURRENT]] * workers)
         before = dict(fleet.cpu_s)
         measured = await rate(fleet, scans)
         busiest = max(used - before[worker] for worker, used in fleet.cpu_s.items())

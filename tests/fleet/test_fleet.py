@@ -13,7 +13,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fleet import fleet as fleet_module
 from firstfix.fleet.engine import WorkerLostError
 from firstfix.fleet.fleet import Fleet, NotReadyError, UnknownMapError
-from firstfix.fleet.jobs import Prepare, ShardedSite, run_job, spread
+from firstfix.fleet.jobs import Prepare, ShardedSite, parts_for, run_job, spread
 from firstfix.io.maps.site_yaml import read_site
 from firstfix.site.query import SiteQuery
 
@@ -57,6 +57,40 @@ def test_shards_are_all_maps_once_and_of_one_size(rooms: Path) -> None:
         assert len(shards) == min(workers, len(maps))
         assert all(shards)
     assert spread(maps, 2) == spread(tuple(reversed(maps)), 2)
+
+
+@pytest.mark.parametrize(
+    ("maps", "workers", "parts"),
+    [(5, 8, 1), (99, 8, 1), (100, 8, 2), (1000, 8, 8), (200, 6, 3), (1000, 7, 7), (0, 3, 1)],
+)
+def test_a_small_site_is_copied_and_a_large_one_is_spread(
+    maps: int, workers: int, parts: int
+) -> None:
+    assert parts_for(maps, workers) == parts
+
+
+def test_queries_go_to_the_copy_that_has_least_to_do(
+    here: tuple[Here, Fleet], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    engine, one = here
+    fleet = Fleet(engine, one.shards, copies=2)
+    asked: list[int] = []
+
+    async def ask(worker: int, job: Any) -> Any:
+        asked.append(worker)
+        await asyncio.sleep(0.0)
+        return await Here.ask(engine, worker % len(fleet.shards), job)
+
+    monkeypatch.setattr(engine, "ask", ask)
+
+    async def drive() -> list[str | None]:
+        await fleet.prepare()
+        asked.clear()
+        queries = [SiteQuery.of(scan_of(room, POSE)) for room in ("first", "second")]
+        return [result.map_id for result in await asyncio.gather(*map(fleet.locate, queries))]
+
+    assert asyncio.run(drive()) == ["first", "second"]
+    assert set(asked) == set(range(2 * len(fleet.shards)))
 
 
 def test_a_lost_job_is_given_again(here: tuple[Here, Fleet]) -> None:

@@ -106,7 +106,9 @@ def test_the_service_runs_on_a_cluster(
     cluster: Any, serve: Callable[..., FleetServer], rooms: Path
 ) -> None:
     address = cluster.address
-    server = serve(rooms, "--engine", "ray", "--ray-address", address, "--workers", "2")
+    server = serve(
+        rooms, "--engine", "ray", "--ray-address", address, "--workers", "2", "--parts", "2"
+    )
     server.wait_until_ready()
     body = {"scans": [as_message(scan_of("second", POSE))]}
     found = server.http.post("/v1/locate", json=body).json()

@@ -25,7 +25,7 @@ POSE = SE2(3.9, 1.7, 0.6)
 
 @pytest.fixture(scope="module")
 def server(serve: Callable[..., FleetServer], rooms: Path) -> FleetServer:
-    return serve(rooms, "--workers", "2", "--max-robots", "3").wait_until_ready()
+    return serve(rooms, "--workers", "2", "--parts", "2", "--max-robots", "3").wait_until_ready()
 
 
 def ask(server: FleetServer, **body: Any) -> dict[str, Any]:
@@ -259,6 +259,7 @@ def test_the_document_has_all_routes(server: FleetServer) -> None:
     ("options", "sentence"),
     [
         (["--host", "0.0.0.0"], "expected a --token"),  # noqa: S104
+        (["--workers", "3", "--parts", "2"], "3 workers cannot share 2 parts."),
         (["--token", "short"], "expected a token of at least 8 characters"),
         (["--ray-address", "127.0.0.1:1"], "--ray-address is of no use without --engine ray."),
     ],

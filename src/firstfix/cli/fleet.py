@@ -45,6 +45,10 @@ def serve(
     workers: Annotated[
         int | None, typer.Option(min=1, max=10_000, help="By default one for each core.")
     ] = None,
+    parts: Annotated[
+        int | None,
+        typer.Option(min=1, max=10_000, help="Parts of the site; by default of 50 maps or more."),
+    ] = None,
     ray_address: Annotated[
         str | None,
         typer.Option(metavar="HOST:PORT", help="A running cluster; by default a local one starts."),
@@ -83,22 +87,29 @@ def serve(
         raise _not_installed(error, "fleet") from error
     from firstfix.fields.cache import cache_folder
     from firstfix.fleet.fleet import Fleet
-    from firstfix.fleet.jobs import ShardedSite, spread
+    from firstfix.fleet.jobs import ShardedSite, parts_for, spread
     from firstfix.fleet.service import FleetConfig, Service
     from firstfix.io.maps.site_yaml import read_site
     from firstfix.web.server import listen, server_of, url_of
 
-    shards = spread(read_site(site_path).maps, workers or os.cpu_count() or 1)
+    maps, number = read_site(site_path).maps, workers or os.cpu_count() or 1
+    parts = parts or parts_for(len(maps), number)
+    if number % parts:
+        raise InputError(f"{number} workers cannot share {parts} parts. Make it a multiple.")
+    shards, copies = spread(maps, parts), number // parts
+    # Copies map the same files into memory.
     sharded = ShardedSite(
-        site_path.resolve(), shards, cache_folder() / "sites", memory * MB // len(shards)
+        site_path.resolve(), shards * copies, cache_folder() / "sites", memory * MB // len(shards)
     )
     with listen(host, port) as listening:
         started = _start(engine, sharded, ray_address)
-        service = Service(Fleet(started, shards), FleetConfig(max_waiting, max_robots, idle))
+        service = Service(
+            Fleet(started, shards, copies), FleetConfig(max_waiting, max_robots, idle)
+        )
         app = make_app(service, access)
         typer.echo(
             f"Fleet service  {url_of(listening)}  {sum(map(len, shards))} maps, "
-            f"{len(shards)} workers (Ctrl-C ends)"
+            f"{len(shards)} parts, {copies} workers for each (Ctrl-C ends)"
         )
         try:
             with suppress(KeyboardInterrupt):  # the usual end

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
@@ -41,7 +42,10 @@ class Fleet:
     engine : Engine
         Runs the workers.
     shards : tuple of tuple of str
-        Ids of the maps of each worker.
+        Ids of the maps of each part of the site.
+    copies : int
+        Workers that have the same part: worker ``n`` has part ``n % len(shards)``. A query goes to
+        one set of workers that have all parts.
     prepared : set of str
         Maps that can be searched.
     faults : dict of str to str
@@ -56,11 +60,13 @@ class Fleet:
 
     engine: Engine
     shards: tuple[tuple[str, ...], ...]
+    copies: int = 1
     prepared: set[str] = field(default_factory=set)
     faults: dict[str, str] = field(default_factory=dict)
     memory: dict[int, int] = field(default_factory=dict)
     cpu_s: dict[int, float] = field(default_factory=dict)
     lost_jobs: int = 0
+    _running: Counter[int] = field(default_factory=Counter)
 
     @property
     def map_ids(self) -> tuple[str, ...]:
@@ -102,10 +108,16 @@ class Fleet:
         """
         started = time.perf_counter()
         parts = self._usable(query, only)
-        looked = await self._all([(i, Look(query, names)) for i, names in parts])
-        promising = set(Looked.joined(looked).promising)
-        chosen = [(i, tuple(n for n in names if n in promising)) for i, names in parts]
-        found = await self._all([(i, Search(query, names)) for i, names in chosen if names])
+        copy = min(range(self.copies), key=lambda i: self._running[i])
+        self._running[copy] += 1
+        try:
+            looked = await self._all(copy, [(i, Look(query, names)) for i, names in parts])
+            promising = set(Looked.joined(looked).promising)
+            chosen = [(i, tuple(n for n in names if n in promising)) for i, names in parts]
+            searches = [(i, Search(query, names)) for i, names in chosen if names]
+            found = await self._all(copy, searches)
+        finally:
+            self._running[copy] -= 1
         result = await asyncio.to_thread(judge_site, query, looked, found)
         return replace(
             result,
@@ -153,9 +165,10 @@ class Fleet:
             else:
                 self.faults[map_id] = fault
 
-    async def _all(self, asked: Sequence[tuple[int, Job[T]]]) -> list[T]:
+    async def _all(self, copy: int, asked: Sequence[tuple[int, Job[T]]]) -> list[T]:
         """Let several workers work at once; if one fails, wait for no other."""
-        return list(await asyncio.gather(*(self._ask(worker, job) for worker, job in asked)))
+        first = copy * len(self.shards)
+        return list(await asyncio.gather(*(self._ask(first + part, job) for part, job in asked)))
 
     async def _ask(self, worker: int, job: Job[T]) -> T:
         for pause in PAUSES_S:

@@ -18,7 +18,7 @@ from ray import serve  # isort: skip
 from firstfix.fields.cache import cache_folder
 from firstfix.fleet.app import make_app
 from firstfix.fleet.fleet import Fleet
-from firstfix.fleet.jobs import ShardedSite, spread
+from firstfix.fleet.jobs import ShardedSite, parts_for, spread
 from firstfix.fleet.service import Service
 from firstfix.io.maps.site_yaml import read_site
 from firstfix.web.access_control import AccessPolicy
@@ -55,10 +55,13 @@ def build(arguments: dict[str, str]) -> Any:
         raise InputError("Set FIRSTFIX_TOKEN: Ray Serve can be reached by other machines.")
 
     def front() -> Any:
-        shards = spread(read_site(site).maps, workers)
+        maps = read_site(site).maps
+        shards = spread(maps, parts_for(len(maps), workers))
+        copies = max(1, workers // len(shards))
         size = MEMORY // len(shards)
-        engine = RayEngine(ShardedSite(site, shards, cache_folder() / "sites", size), None)
-        return make_app(Service(Fleet(engine, shards)), AccessPolicy(token, loopback_only=False))
+        engine = RayEngine(ShardedSite(site, shards * copies, cache_folder() / "sites", size), None)
+        service = Service(Fleet(engine, shards, copies))
+        return make_app(service, AccessPolicy(token, loopback_only=False))
 
     class FleetFront:
         """Answers HTTP requests."""
