@@ -14,7 +14,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.verdict import log_likelihoods, place_probabilities
 from firstfix.site.judge import MAP_EXPONENT, are_one_place, judge_site
-from firstfix.site.look import Looked
+from firstfix.site.look import PROMISING, Looked
 from firstfix.site.places import SiteCandidates, SitePlace
 from firstfix.site.query import SiteQuery
 from firstfix.site.surroundings import show_the_same, surroundings
@@ -47,7 +47,7 @@ def place(
 
 def judged(*places: SitePlace, recall: float = 1.0, parts: int = 1):
     names = tuple(dict.fromkeys(one.map_id for one in places))
-    seen = (*names, "not searched")
+    seen = (*names, *(f"not searched {i}" for i in range(PROMISING)))
     looked = [Looked(seen, np.zeros(len(seen)), recall, len(names))]
     found = []
     for i in range(parts):

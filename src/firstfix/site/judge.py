@@ -36,7 +36,7 @@ SURE_PROBABILITY = BeliefConfig().sure_probability
 # One look decides between maps by the power law of the verdict on the best cost of each, with this
 # exponent, and within a map by the law itself, whose exponent is 12: places of one map share its
 # errors, those of another do not. So no place is surer than in its map alone (0021).
-MAP_EXPONENT = 16.0
+MAP_EXPONENT = 14.0
 
 LISTED_PLACES = 24
 
