@@ -199,7 +199,14 @@ def serve_simulated(
         if bridge is not None:
             bridge.attach(node.give)
         executor = CommandExecutor(store, node.give, robot)
-        page = Page("sim", store, executor, access, on_first_viewer=robot.resume)
+        page = Page(
+            "sim",
+            store,
+            executor,
+            access,
+            on_first_viewer=robot.resume,
+            incidents=lambda: node.incidents,
+        )
         node.start()
         announce(listening, access)
         with suppress(KeyboardInterrupt):  # the usual end; some versions of uvicorn raise it

@@ -133,7 +133,7 @@ class IncidentRecorder:
         self._stamp = 0.0
         self._lock = threading.Lock()
 
-    def observe(self, given: Input, outputs: list[Output], localizer: Localizer) -> Cause | None:
+    def observe(self, given: Input, outputs: list[Output], localizer: object) -> Cause | None:
         """Keep an input with its outputs.
 
         Parameters
@@ -143,15 +143,15 @@ class IncidentRecorder:
         outputs : list of Output
             What `Localizer.handle` returned for it.
         localizer : Localizer
-            After the input.
+            After the input. Of another one, such as that of a site, nothing is kept.
 
         Returns
         -------
         Cause or None
             Why an incident should be saved now; None if nothing has happened.
         """
-        if type(localizer) is not Localizer:
-            return None  # that of a site, which has several
+        if not isinstance(localizer, Localizer):
+            return None
         with self._lock:
             before, self._state = self._state, localizer.state
             if isinstance(given, NewMap) or localizer is not self._localizer:

@@ -11,7 +11,6 @@ from firstfix.io.incident_files import IncidentFolder, packed
 from firstfix.localizer.incident import Cause, Incident, IncidentRecorder
 from firstfix.localizer.incident_document import to_document
 from firstfix.localizer.inputs import Input
-from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Output, Status
 
 
@@ -39,7 +38,7 @@ class IncidentKeeper:
         self._disk = ThreadPoolExecutor(1, "firstfix-incidents")
         self._writing: Future[str] | None = None
 
-    def __call__(self, given: Input, outputs: list[Output], localizer: Localizer) -> None:
+    def __call__(self, given: Input, outputs: list[Output], localizer: object) -> None:
         """Keep an input with its outputs; save an incident if one has happened."""
         if self._recorder is None:
             return
@@ -65,7 +64,7 @@ class IncidentKeeper:
             raise InputError("Nothing is kept: incident_seconds is 0. Set it to 30, for instance.")
         incident = self._recorder.take(Cause.REQUESTED, reason)
         if incident is None:
-            raise InputError("There is nothing to save before the first map. Try again later.")
+            raise InputError("Nothing is kept before the first map, nor in a site of several maps.")
         return self._write(incident)
 
     def close(self) -> None:

@@ -11,6 +11,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from firstfix.web import incidents
 from firstfix.web.broadcaster import Broadcaster
 from firstfix.web.commands import Command, Pose, Relocalize, SetPose
 from firstfix.web.dropped_files import DroppedFiles
@@ -56,6 +57,9 @@ class Api:
             Route("/v1/locate-files", self.locate_files, methods=["POST"]),
             Route("/v1/pose", self.pose, methods=["POST"]),
             Route("/v1/relocalize", self.relocalize, methods=["POST"]),
+            Route("/v1/incidents", self.incidents),
+            Route("/v1/incidents", self.save_incident, methods=["POST"]),
+            Route("/v1/incidents/{name}", self.incident),
             Route("/openapi.json", self.openapi),
         ]
 
@@ -116,6 +120,28 @@ class Api:
         self._page.check_may_steer()
         self._page.map()
         return await self._execute(Relocalize())
+
+    async def incidents(self, _: Request) -> Response:
+        """List the saved incidents."""
+        keeper = incidents.keeper_of(self._page.incidents)
+        return _json(await run_in_threadpool(incidents.listed, keeper))
+
+    async def save_incident(self, _: Request) -> Response:
+        """Save the last seconds."""
+        self._page.check_may_steer()
+        keeper = incidents.keeper_of(self._page.incidents)
+        return _json(await run_in_threadpool(incidents.saved, keeper), 201)
+
+    async def incident(self, request: Request) -> Response:
+        """Return a saved incident."""
+        name = request.path_params["name"]
+        keeper = incidents.keeper_of(self._page.incidents)
+        found = await run_in_threadpool(incidents.content, keeper, name)
+        headers = {
+            "cache-control": "no-store",
+            "content-disposition": f'attachment; filename="{name}"',
+        }
+        return Response(found, 200, headers, NPZ)
 
     async def openapi(self, _: Request) -> Response:
         """Describe the API."""

@@ -49,7 +49,13 @@ class BackgroundPage:
         self._watchers = watchers
         self._node: Node | None = None
         self._server = make_server(
-            Page(robot, self._store, CommandExecutor(self._store, self.give), access)
+            Page(
+                robot,
+                self._store,
+                CommandExecutor(self._store, self.give),
+                access,
+                incidents=lambda: None if self._node is None else self._node.incidents,
+            )
         )
         serve = {"sockets": [listening]}
         self._thread = threading.Thread(

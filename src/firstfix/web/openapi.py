@@ -9,6 +9,7 @@ import msgspec
 from firstfix import __version__
 from firstfix.web.commands import Pose
 from firstfix.web.dropped_files import MOST_FILES
+from firstfix.web.incidents import Incidents, SavedIncident
 from firstfix.web.locate_request import Query, Scan
 from firstfix.web.map_changes import Changes
 from firstfix.web.map_png import LEAST_PIXELS, MOST_PIXELS
@@ -18,7 +19,20 @@ from firstfix.web.request_body import JSON, NPZ
 
 Schema = dict[str, Any]
 
-_STRUCTS = (Pose, Query, Scan, Accepted, Answer, LocatedFiles, Map, Changes, Status, Problem)
+_STRUCTS = (
+    Incidents,
+    SavedIncident,
+    Pose,
+    Query,
+    Scan,
+    Accepted,
+    Answer,
+    LocatedFiles,
+    Map,
+    Changes,
+    Status,
+    Problem,
+)
 # Refusals of requests with a body.
 _BODY = (400, 408, 413, 415, 422)
 
@@ -99,6 +113,16 @@ def _paths() -> Schema:
                 "Discard the pose and search", _json(Accepted), 403, 503, success=202
             )
         },
+        "/v1/incidents": {
+            "get": _operation("The saved incidents, newest first", _json(Incidents), 503),
+            "post": _operation(
+                "Save the last seconds", _json(SavedIncident), 403, 422, 503, success=201
+            ),
+        },
+        "/v1/incidents/{name}": {
+            "get": _operation("An incident, for `firstfix replay`", {NPZ: {}}, 404, 503)
+            | {"parameters": [_in_path("name", "one of the names of /v1/incidents")]}
+        },
         "/openapi.json": {
             "get": _operation("This document", {JSON: {"schema": {"type": "object"}}})
         },
@@ -139,3 +163,7 @@ def _ref(struct: type) -> Schema:
 
 def _query(name: str, description: str) -> Schema:
     return {"name": name, "in": "query", "description": description, "schema": {"type": "string"}}
+
+
+def _in_path(name: str, description: str) -> Schema:
+    return _query(name, description) | {"in": "path", "required": True}

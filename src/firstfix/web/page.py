@@ -9,6 +9,7 @@ from starlette.exceptions import HTTPException
 
 from firstfix.web.access_control import AccessPolicy
 from firstfix.web.command_executor import CommandExecutor
+from firstfix.web.incidents import GetKeeper, no_keeper
 from firstfix.web.map_changes import ChangesCache
 from firstfix.web.map_png import MapPngCache
 from firstfix.web.messages import Hello, Map, encode_text
@@ -45,6 +46,8 @@ class Page:
         Encodes maps.
     changes : ChangesCache
         Finds what has changed in the map.
+    incidents : callable
+        Returns what keeps the incidents; None while there is nothing.
     """
 
     robot: str
@@ -55,6 +58,7 @@ class Page:
     rate_limiter: RateLimiter = field(default_factory=RateLimiter)
     map_pngs: MapPngCache = field(default_factory=MapPngCache)
     changes: ChangesCache = field(default_factory=ChangesCache)
+    incidents: GetKeeper = no_keeper
 
     def hello(self) -> str:
         """Return the first message to a viewer."""

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.fields.cache import cache_folder
+from firstfix.io.incident_files import IncidentFolder, incident_folder
 from firstfix.lab.live.plain_amcl import PlainAmcl
 from firstfix.lab.live.simulated_robot import SimulatedRobot
 from firstfix.lab.simulation.simulation import PERIOD_S, Moment
@@ -19,12 +20,16 @@ from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import TrackedPose
 from firstfix.localizer.precompile import precompile
 from firstfix.ros.inbox import Inbox
+from firstfix.ros.incident_keeper import IncidentKeeper
 from firstfix.ros.node import Watcher
+from firstfix.ros.node_config import NodeConfig
 from firstfix.web.snapshot import AmclStart
 from firstfix.web.snapshot_store import SnapshotStore
 
 # Longest wait for the present step at the end.
 _END_S = 5.0
+# What is kept for an incident, as on a real robot, s.
+_KEPT_S = NodeConfig().incident_seconds
 
 
 class SimulatedNode:
@@ -58,7 +63,8 @@ class SimulatedNode:
         self._robot = robot
         self._store = store
         self._warn = warn
-        self._watchers: tuple[Watcher, ...] = (store, *watchers)
+        self.incidents = IncidentKeeper(_KEPT_S, IncidentFolder(incident_folder()), warn)
+        self._watchers: tuple[Watcher, ...] = (store, self.incidents, *watchers)
         self._inbox: Inbox[Input] = Inbox()
         self._starts = robot.starts
         self._amcl: PlainAmcl | None = None
@@ -76,6 +82,7 @@ class SimulatedNode:
         """Stop after the present step, unless that takes long, as compiling does."""
         self._inbox.close()
         self._thread.join(_END_S)
+        self.incidents.close()
 
     def give(self, given: Input) -> None:
         """Queue an input for the localizer; thread-safe."""

@@ -8,6 +8,7 @@ import { Gestures } from "./gestures.js";
 import { listenToKeys } from "./keyboard.js";
 import { Changes } from "./layers/changes.js";
 import { boundsOf } from "./layers/map.js";
+import { offerIncidents } from "./incidents.js";
 import { Notices } from "./notices.js";
 import { Panel } from "./panel.js";
 import { Past } from "./past.js";
@@ -88,6 +89,7 @@ function greet(hello) {
   past.clear();
   timeline.replace(hello.events);
   actions.allow(hello);
+  offerIncidents(hello, notices);
   tour.greet(hello);
   document.querySelector("[data-layer=truth]").hidden = hello.robot !== "sim";
   if (hello.map) showMap(hello.map);
