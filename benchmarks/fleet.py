@@ -155,7 +155,9 @@ def robots(site: Path, bodies: Sequence[dict[str, Any]], truths: Sequence[str], 
     counts: Counter[str] = Counter()
     with (
         service(site, os.cpu_count() or 1) as (url, _),
-        httpx.Client(base_url=url, timeout=120.0, limits=httpx.Limits(count, count)) as http,
+        httpx.Client(
+            base_url=url, timeout=120.0, limits=httpx.Limits(max_connections=count)
+        ) as http,
         ThreadPoolExecutor(count) as pool,
     ):
         asked = [

@@ -161,7 +161,7 @@ def test_a_picture_of_the_demo_needs_headless(cli) -> None:
 
 
 def test_a_browser_is_opened_only_on_a_display(monkeypatch, capsys) -> None:
-    from firstfix.cli.serve import _announce
+    from firstfix.cli.serve import announce
     from firstfix.web.access_control import AccessPolicy
     from firstfix.web.server import listen
 
@@ -171,13 +171,13 @@ def test_a_browser_is_opened_only_on_a_display(monkeypatch, capsys) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     with listen("127.0.0.1", 0) as listening:
-        _announce(listening, AccessPolicy())
+        announce(listening, AccessPolicy())
         assert opened == []
         monkeypatch.setenv("DISPLAY", ":0")
-        _announce(listening, AccessPolicy())
+        announce(listening, AccessPolicy())
         assert opened == []  # in a pipe
         monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-        _announce(listening, AccessPolicy(TOKEN))
+        announce(listening, AccessPolicy(TOKEN))
     (url,) = opened
     assert url.endswith(f"#token={TOKEN}")
     assert url in capsys.readouterr().out

@@ -8,10 +8,12 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.localizer.outputs import (
     Hypotheses,
     InitialPose,
+    MapSwitched,
     MotionRequest,
     Output,
     Status,
@@ -23,6 +25,7 @@ ONE_OF_EACH = [
     InitialPose(1.0, SE2.identity(), np.eye(3)),
     TrackedPose(1.0, SE2.identity(), np.eye(3), SE2.identity()),
     Hypotheses(1.0, ()),
+    MapSwitched(1.0, "ground", OccupancyGrid(np.zeros((2, 2), np.int8), 0.05)),
     MotionRequest(1.0, 0.5, 1.0, 0.2),
     Status(1.0, State.SEARCHING, "no map yet"),
 ]

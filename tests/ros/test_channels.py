@@ -23,11 +23,15 @@ from firstfix.ros.node_config import Mode, NodeConfig
 # Inputs without a topic.
 SERVICES = {Channel.RESET, Channel.UPDATE, Channel.INPUT}
 # Subscribed to where a parameter names them.
-FURTHER = {Channel.CLOUD, Channel.DEPTH, Channel.CAMERA_INFO}
+FURTHER = {Channel.CLOUD, Channel.DEPTH, Channel.CAMERA_INFO, Channel.MAP_HINT}
 
 
 def test_every_input_has_a_topic_or_a_service():
     assert set(subscribed_topics(NodeConfig())) == set(Channel) - SERVICES - FURTHER
+
+
+def test_the_floor_is_told_to_a_node_with_a_site_only():
+    assert Channel.MAP_HINT in subscribed_topics(NodeConfig(site="building"))
 
 
 def test_names_are_those_of_nav2_and_kobuki():

@@ -99,6 +99,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "update_min_d": {"to": 2.0, "with": {"update_min_a": 3.0}},
     "update_min_a": {"to": 2.0, "with": {"update_min_d": 3.0}},
     "random_seed": {"to": 7},
+    "site": {"to": "."},
     "deskew": {"to": False, "in": "a slow laser"},
     "changes.days_kept": {"to": 2},
     "locate.max_poses": {"to": 1000},
