@@ -33,7 +33,7 @@ def test_in_rooms_that_look_alike_nothing_helps() -> None:
 def test_a_camera_must_look_around(hall_plan: OccupancyGrid) -> None:
     found = predict(hall_plan, RIGS["depth-camera"], 3, 1, nothing)
     assert share(found, Effort.SCAN, Answer.RIGHT) < share(found, Effort.TURN, Answer.RIGHT)
-    assert share(found, Effort.TURN, Answer.WRONG) == 0.0
+    assert share(found, Effort.SCAN, Answer.WRONG) == 0.0
 
 
 def test_a_sensor_that_sees_nothing_is_told_apart() -> None:
