@@ -123,13 +123,15 @@ def service(site: Path, workers: int) -> Iterator[tuple[str, int]]:
     options = ["--workers", f"{workers}", "--port", "0"]
     with subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None  # noqa: S101 - for mypy
-        found = re.search(r"http://[^\s/]+", process.stdout.readline())
-        if found is None:
-            raise SystemExit("the service did not start")
-        while httpx.get(f"{found.group()}/readyz").status_code != 200:
-            time.sleep(0.2)
-        yield found.group(), process.pid
-        process.send_signal(signal.SIGINT)
+        try:
+            found = re.search(r"http://[^\s/]+", process.stdout.readline())
+            if found is None:
+                raise SystemExit("the service did not start")
+            while httpx.get(f"{found.group()}/readyz").status_code != 200:
+                time.sleep(0.2)
+            yield found.group(), process.pid
+        finally:
+            process.send_signal(signal.SIGINT)
 
 
 def body_of(scan: LaserScan) -> dict[str, Any]:
