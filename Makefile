@@ -31,8 +31,10 @@ demo: $(USER_STAMP)
 	    case "$$answer" in [Nn]*) ;; *) exec $(BIN)/firstfix demo $(DEMO_ARGS);; esac; \
 	fi
 
+# A cluster of Ray fills the machine: its tests run after the others, and one by one.
 test: $(STAMP)
-	$(BIN)/python -m pytest -n 4 --dist worksteal $(TEST_ARGS)
+	$(BIN)/python -m pytest -n 4 --dist worksteal $(or $(TEST_ARGS),-m "not cluster")
+	$(if $(TEST_ARGS),,$(BIN)/python -m pytest -m cluster tests/fleet)
 
 check: $(STAMP)
 	$(BIN)/ruff format --check .

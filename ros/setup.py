@@ -46,7 +46,11 @@ if __name__ == "__main__":
         version=version(),
         package_dir={"": "../src"},
         packages=find_packages(str(SOURCE)),
-        package_data={"firstfix": ["py.typed"], "firstfix.web": ["static/*", "static/**/*"]},
+        package_data={
+            "firstfix": ["py.typed"],
+            "firstfix.fleet": ["static/*"],
+            "firstfix.web": ["static/*", "static/**/*"],
+        },
         data_files=data_files(),
         zip_safe=False,
         entry_points={"console_scripts": ["firstfix = firstfix.cli.app:main"]},

@@ -24,6 +24,7 @@ from firstfix.site.query import SiteQuery
 
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.cluster,
     # Ray leaves sockets and files to the end of the process.
     pytest.mark.filterwarnings("ignore"),
 ]
@@ -43,7 +44,7 @@ def cluster() -> Iterator[Any]:
     from ray.cluster_utils import Cluster
 
     here = {"node_ip_address": LOCAL, "include_dashboard": False}
-    soon = {"health_check_period_ms": 500, "health_check_failure_threshold": 2}
+    soon = {"health_check_period_ms": 1000, "health_check_failure_threshold": 3}
     cluster = Cluster(
         initialize_head=True, head_node_args={"num_cpus": 0, "_system_config": soon, **here}
     )
@@ -97,7 +98,7 @@ def test_queries_survive_the_loss_of_a_node(
         assert fleet.lost_jobs > 0
 
     try:
-        asyncio.run(drive())
+        asyncio.run(asyncio.wait_for(drive(), 3.0 * BACK_S))
     finally:
         engine.close()
 

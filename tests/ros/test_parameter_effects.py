@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -175,7 +176,7 @@ class Drive:
         recorder = Recorder(self.wire)
         recorder.listening = {PARTICLES.name: 1, INITIAL_POSE.name: 1}
         node = Node(config, recorder)
-        before = len(node.incidents.folder.files())
+        shutil.rmtree(node.incidents.folder.path, ignore_errors=True)  # it keeps 20 at most
         if config.yaml_filename:
             node._load_own_map()
         node._prepare()
@@ -189,7 +190,7 @@ class Drive:
         # What the live page shows of changes of the map.
         changes = f"changes: {node._localizer.changes is not None}"
         node.incidents.close()
-        saved = len(node.incidents.folder.files()) - before
+        saved = len(node.incidents.folder.files())
         lines = [f"{node.incidents.folder.path}", f"{saved} incidents", changes]
         return [*topics, *map(str, recorder.published), *map(str, recorder.lines), *lines]
 

@@ -66,7 +66,7 @@ def test_an_incident_is_saved_listed_and_downloaded(keeper, tmp_path, hall_plan)
 
 def test_what_cannot_be_saved_is_a_problem(keeper):
     read_only = page_of(keeper, AccessPolicy(may_steer=False))
-    for page, status in ((read_only, 403), (page_of(None), 503)):
+    for page, status in ((read_only, 403), (page_of(None), 409)):
         with served(page) as url:
             answer = httpx.post(f"{url.rstrip('/')}/v1/incidents")
         assert answer.status_code == status

@@ -284,7 +284,7 @@ def test_layers_can_be_hidden(visit: Visitor, office_server: Server, device: dic
     page.wait_for_fix()
     if device is PHONE:
         page.page.tap("#sheet-handle")
-    for chip in page.page.locator("[data-layer]").all():
+    for chip in page.page.locator("[data-layer]:visible").all():
         chip.click()
         assert chip.get_attribute("aria-pressed") == "false"
     page.page.wait_for_timeout(200)

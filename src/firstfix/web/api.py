@@ -57,8 +57,7 @@ class Api:
             Route("/v1/locate-files", self.locate_files, methods=["POST"]),
             Route("/v1/pose", self.pose, methods=["POST"]),
             Route("/v1/relocalize", self.relocalize, methods=["POST"]),
-            Route("/v1/incidents", self.incidents),
-            Route("/v1/incidents", self.save_incident, methods=["POST"]),
+            Route("/v1/incidents", self.incidents, methods=["GET", "POST"]),
             Route("/v1/incidents/{name}", self.incident),
             Route("/openapi.json", self.openapi),
         ]
@@ -121,12 +120,14 @@ class Api:
         self._page.map()
         return await self._execute(Relocalize())
 
-    async def incidents(self, _: Request) -> Response:
-        """List the saved incidents."""
+    async def incidents(self, request: Request) -> Response:
+        """List the saved incidents, or save one."""
+        if request.method == "POST":
+            return await self._save_incident()
         keeper = incidents.keeper_of(self._page.incidents)
         return _json(await run_in_threadpool(incidents.listed, keeper))
 
-    async def save_incident(self, _: Request) -> Response:
+    async def _save_incident(self) -> Response:
         """Save the last seconds."""
         self._page.check_may_steer()
         keeper = incidents.keeper_of(self._page.incidents)

@@ -46,11 +46,11 @@ def keeper_of(get: GetKeeper) -> IncidentKeeper:
     Raises
     ------
     HTTPException
-        503 while there is no node.
+        409 while there is no node.
     """
     keeper = get()
     if keeper is None:
-        raise HTTPException(503, "Nothing is kept yet. Try again later.", {"retry-after": "1"})
+        raise HTTPException(409, "No robot is connected: nothing is kept yet. Try again later.")
     return keeper
 
 

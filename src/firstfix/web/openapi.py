@@ -114,13 +114,13 @@ def _paths() -> Schema:
             )
         },
         "/v1/incidents": {
-            "get": _operation("The saved incidents, newest first", _json(Incidents), 503),
+            "get": _operation("The saved incidents, newest first", _json(Incidents), 409),
             "post": _operation(
-                "Save the last seconds", _json(SavedIncident), 403, 422, 503, success=201
+                "Save the last seconds", _json(SavedIncident), 403, 422, 409, success=201
             ),
         },
         "/v1/incidents/{name}": {
-            "get": _operation("An incident, for `firstfix replay`", {NPZ: {}}, 404, 503)
+            "get": _operation("An incident, for `firstfix replay`", {NPZ: {}}, 404, 409)
             | {"parameters": [_in_path("name", "one of the names of /v1/incidents")]}
         },
         "/openapi.json": {

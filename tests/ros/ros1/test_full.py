@@ -109,7 +109,8 @@ def test_at_rest_a_scan_is_used_on_request_and_late_subscribers_get_the_pose(ros
     robot.end()
     late = ros1.watch("amcl_pose", "localization_status")
     assert late.wait_for("amcl_pose")["pose"] == watcher.lines("amcl_pose")[-1]["pose"]
-    assert late.wait_for("localization_status")["state"] == "LOCALIZED"
+    # No scan for longer than scan_timeout: the pose is still there, and its status says so.
+    assert late.wait_for("localization_status")["state"] in ("LOCALIZED", "STALE")
 
 
 @pytest.mark.parametrize("source", ["service", "file"])

@@ -1,7 +1,7 @@
 /** What has changed in the map since it was made: an image over the map, fetched while it is shown. */
 
 import { authorization } from "../token.js";
-import { drawMap } from "./map.js";
+import { drawOver } from "./map.js";
 
 const EVERY_MS = 5000;
 
@@ -44,5 +44,5 @@ export class Changes {
 
 /** Draw the changes; the image has the pixels of that of the map. */
 export function drawChanges(ctx, view, map, image) {
-  drawMap(ctx, view, map, image);
+  drawOver(ctx, view, map, image);
 }

@@ -111,17 +111,21 @@ export function boundsOf(map) {
 
 /** Draw the map; its lower-left corner is that of the image. */
 export function drawMap(ctx, view, map, coloured) {
+  const block = coloured.blockFor(view.scale * map.image.resolution);
+  drawOver(ctx, view, map, coloured.level(block), block);
+}
+
+/** Draw an image over the map whose pixels are blocks of so many of its pixels. */
+export function drawOver(ctx, view, map, image, block = 1) {
   const [x0, y0, yaw] = map.origin;
   const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
-  const block = coloured.blockFor(view.scale * map.image.resolution);
-  const canvas = coloured.level(block);
   const side = block * map.image.resolution; // m
-  const high = canvas.height * side;
+  const high = image.height * side;
   const [left, top] = view.toScreen(x0 - sin * high, y0 + cos * high);
   const size = view.scale * side;
   ctx.save();
   ctx.transform(size * cos, -size * sin, size * sin, size * cos, left, top);
   ctx.imageSmoothingEnabled = false; // it would make thin walls pale
-  ctx.drawImage(canvas, 0, 0);
+  ctx.drawImage(image, 0, 0);
   ctx.restore();
 }
