@@ -195,12 +195,16 @@ def test_the_belief_is_a_heat_layer(visit: Visitor, rooms_server: Server) -> Non
     cell = corner + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     points = cell[np.hypot(*(cell - place).T) > 0.27]  # beside the symbol of the place
     assert len(points) >= 3
-    shown = [page.colour("overlay", *point) for point in points]
+
+    def is_heat() -> bool:
+        shown = [page.colour("overlay", *point) for point in points]
+        return all(alpha > 100 and blue > green + 40 for _, green, blue, alpha in shown)
+
+    wait_until(is_heat, lambda: f"{[page.colour('overlay', *point) for point in points]}")
     page.page.click("[data-layer=belief]")
     page.page.wait_for_timeout(300)
     hidden = [page.colour("overlay", *point) for point in points]
     page.page.click("#pause")
-    assert all(alpha > 100 and blue > green + 40 for _, green, blue, alpha in shown), shown
     assert set(hidden) == {(0, 0, 0, 0)}
 
 
