@@ -93,8 +93,14 @@ def test_each_end_is_reported(broker, listen, robot):
             wait(lambda log=log: log)
             for _ in range(number):
                 robot.scan()
-        wait(lambda number=number: len(fleet.of("connection")) == 2 * number + 2)
-    assert {c["connectionState"] for c in fleet.of("connection")[1::2]} == {"OFFLINE"}
+        wait(lambda number=number: states(fleet).count("OFFLINE") == number + 1)
+        assert states(fleet)[-1] == "OFFLINE"
+    assert set(states(fleet)) == {"ONLINE", "OFFLINE"}
+
+
+def states(fleet: Any) -> list[str]:
+    """Return what was said of the connection."""
+    return [message["connectionState"] for message in fleet.of("connection")]
 
 
 def test_version_3_has_its_own_topics(broker, listen, robot):

@@ -162,9 +162,9 @@ class Bridge:
         )
 
     async def _converse(self, client: aiomqtt.Client) -> None:
-        await self._publish_connection(client, "ONLINE")
-        await client.subscribe(self._identity.topic("instantActions"), qos=0)
-        try:
+        try:  # the end may come at any of these steps
+            await self._publish_connection(client, "ONLINE")
+            await client.subscribe(self._identity.topic("instantActions"), qos=0)
             await _first_to_end(self._listen(client), self._speak(client))
         finally:
             if self._is_ending:
