@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import msgspec
-
-from firstfix import __version__
 from firstfix.fleet.messages import (
     ROBOT_NAME,
     Health,
@@ -17,6 +14,7 @@ from firstfix.fleet.messages import (
     SiteAnswer,
 )
 from firstfix.web.locate_request import Scan
+from firstfix.web.openapi import document_of
 from firstfix.web.problem_details import MEDIA_TYPE, Problem
 from firstfix.web.request_body import JSON, NPZ
 
@@ -28,26 +26,11 @@ _BODY = (400, 404, 408, 413, 415, 422, 503)
 
 def document() -> Schema:
     """Return the document."""
-    template = "#/components/schemas/{name}"
-    _, schemas = msgspec.json.schema_components(_STRUCTS, ref_template=template)
-    return {
-        "openapi": "3.1.0",
-        "info": {
-            "title": "firstfix fleet",
-            "version": __version__,
-            "description": "Which map, and where on it? Metres, radians, seconds. Poses are "
-            "[x, y, yaw] of the robot's base in the frame of its map.",
-            "license": {"name": "Apache-2.0", "identifier": "Apache-2.0"},
-        },
-        "servers": [{"url": "/"}],
-        "paths": _paths(),
-        "components": {
-            "schemas": schemas,
-            "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
-        },
-        # The token is needed only if the service was started with one.
-        "security": [{}, {"token": []}],
-    }
+    description = (
+        "Which map, and where on it? Metres, radians, seconds. Poses are [x, y, yaw] of the "
+        "robot's base in the frame of its map."
+    )
+    return document_of("firstfix fleet", description, _STRUCTS, _paths())
 
 
 def _paths() -> Schema:

@@ -216,7 +216,7 @@ def _cause(before: State, given: Input, outputs: list[Output], now: State) -> Ca
     if not any(isinstance(output, Status) for output in outputs):
         return None
     if not isinstance(given, (LaserScan, Odometry)):
-        return None  # somebody asked for it
+        return None  # saved on request
     if before is State.VERIFYING_HINT and now is State.SEARCHING:
         return Cause.REFUSED_HINT
     if before is not State.LOCALIZED:

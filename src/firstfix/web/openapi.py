@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
@@ -39,19 +40,27 @@ _BODY = (400, 408, 413, 415, 422)
 
 def document() -> Schema:
     """Return the document."""
+    description = (
+        "Where is the robot? Metres, radians, seconds. Poses are [x, y, yaw] of the robot's base "
+        "in the map frame."
+    )
+    return document_of("firstfix", description, _STRUCTS, _paths())
+
+
+def document_of(title: str, description: str, structs: Sequence[type], paths: Schema) -> Schema:
+    """Return the document of a server: its paths, and the schemas of its messages."""
     template = "#/components/schemas/{name}"
-    _, schemas = msgspec.json.schema_components(_STRUCTS, ref_template=template)
+    _, schemas = msgspec.json.schema_components(structs, ref_template=template)
     return {
         "openapi": "3.1.0",
         "info": {
-            "title": "firstfix",
+            "title": title,
             "version": __version__,
-            "description": "Where is the robot? Metres, radians, seconds. Poses are "
-            "[x, y, yaw] of the robot's base in the map frame.",
+            "description": description,
             "license": {"name": "Apache-2.0", "identifier": "Apache-2.0"},
         },
         "servers": [{"url": "/"}],
-        "paths": _paths(),
+        "paths": paths,
         "components": {
             "schemas": schemas,
             "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
