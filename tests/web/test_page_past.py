@@ -72,13 +72,42 @@ def test_keys_and_events_lead_into_the_past_and_a_command_back(page: Visit) -> N
     assert page.data("time") == "live"
     page.page.click("#relocalize")
     page.wait_for_event("Relocalization requested")
-    page.wait_for_state("LOCALIZED")
-    wait_until(lambda: moments(page) > 8, lambda: f"{moments(page)} moments")
     page.page.locator("#events li", has_text="Relocalization").first.locator("span").first.click()
     assert page.data("time") == "past"
     page.page.click("#pause")
     assert page.data("time") == "live"
     page.page.click("#pause")
+
+
+def add_event(page: Visit, number: int, text: str) -> None:
+    """Insert an event, newer than every moment."""
+    page.page.evaluate(
+        """async ([number, text]) => {
+            const { Timeline } = await import("/static/timeline.js");
+            new Timeline().add({ number, stamp: 1e9, kind: "state", text });
+        }""",
+        [number, text],
+    )
+
+
+def test_an_event_newer_than_the_newest_moment_can_be_looked_at(page: Visit) -> None:
+    add_event(page, 1000, "Just now")
+    page.page.get_by_text("Just now").click()
+    assert page.data("time") == "past"
+    shown = page.page.text_content("#past-text")
+    kept = moments(page)
+    wait_until(lambda: moments(page) > kept + 2, lambda: "it goes on")
+    assert page.page.text_content("#past-text") == shown
+
+
+def test_a_click_counts_for_the_row_that_was_pressed(page: Visit) -> None:
+    add_event(page, 1000, "Pressed")
+    page.page.get_by_text("Pressed").hover()
+    page.page.mouse.down()
+    for number, text in enumerate(("One more", "And another"), 1001):
+        add_event(page, number, text)
+    page.page.mouse.up()
+    assert page.data("time") == "past"
 
 
 def test_the_past_is_bounded(page: Visit) -> None:

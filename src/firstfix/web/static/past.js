@@ -21,9 +21,16 @@ export class Past {
     this.on = on;
     byId("scrub").addEventListener("input", () => this.#look(Number(byId("scrub").value)));
     for (const id of ["live", "past-live"]) byId(id).addEventListener("click", () => this.goLive());
+    // A new event moves the rows: the row that was pressed counts, not the one below at the release.
+    let pressed = null;
+    byId("events").addEventListener("pointerdown", (event) => {
+      pressed = event.target;
+    });
     byId("events").addEventListener("click", (event) => {
-      const item = event.target.closest("li[data-stamp]");
-      if (item && !event.target.closest("button")) this.lookAt(Number(item.dataset.stamp));
+      const target = pressed ?? event.target;
+      pressed = null;
+      const item = target.closest("li[data-stamp]");
+      if (item && !target.closest("button")) this.lookAt(Number(item.dataset.stamp));
     });
   }
 
@@ -57,10 +64,11 @@ export class Past {
     else if (frame.kind === "belief") last.heat = frame.heat;
   }
 
-  /** Look at the moment of a stamp. */
+  /** Look at the moment of a stamp; at the newest one if it is not yet kept. */
   lookAt(stamp) {
     const next = this.#moments.findIndex(({ state }) => state.stamp >= stamp);
-    if (next >= 0) this.#look(next);
+    const moment = this.#moments.at(next); // -1 if none: the newest
+    if (moment) this.#stopAt(moment);
   }
 
   /** Look at the moment before, or after. */
@@ -81,14 +89,18 @@ export class Past {
       this.goLive();
       return;
     }
-    this.#at = this.#moments[index];
+    this.#stopAt(this.#moments[index]);
+  }
+
+  #stopAt(moment) {
+    this.#at = moment;
     this.#showSlider();
-    this.on.onLook({ ...emptyFrame(), ...this.#at, trail: this.#trail(index) });
+    this.on.onLook({ ...emptyFrame(), ...moment, trail: this.#trail(moment) });
   }
 
   #trail(end) {
     const trail = [];
-    for (const { state } of this.#moments.slice(0, end + 1)) {
+    for (const { state } of this.#moments.slice(0, this.#moments.indexOf(end) + 1)) {
       if (state.pose) leaveTrail(trail, state.pose, JUMP_M);
       else breakTrail(trail);
     }
