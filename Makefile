@@ -12,7 +12,7 @@ CASES ?= $(wildcard ../shared/cases/*/)
 # Where Python may not keep what it parsed, every process of a test parses everything again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check bench recording docs dist release-matrix lock clean
+.PHONY: demo test check bench recording docs dist sign release-matrix lock clean
 
 # Python compiles what it imports, which is a small part of what pip would compile.
 $(USER_STAMP): pyproject.toml
@@ -61,6 +61,10 @@ $(VENV)/.release: $(STAMP)
 
 dist: $(VENV)/.release
 	.ci/release $(BIN)/python
+
+# KEY is the file of a private SSH key whose public one is in allowed_signers.
+sign:
+	ssh-keygen -Y sign -f $(KEY) -n firstfix-release dist/SHA256SUMS
 
 release-matrix: dist
 	$(BIN)/python .ci/release_matrix.py
