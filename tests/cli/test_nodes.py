@@ -37,6 +37,13 @@ def test_ros2_passes_on_all_arguments(cli, monkeypatch: pytest.MonkeyPatch) -> N
     assert lab.world.arguments.parameters == {"mode": "full", "z_hit": 0.6}
 
 
+def test_ros2_passes_on_its_site(cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    lab = Lab(monkeypatch)
+    monkeypatch.chdir(tmp_path)
+    assert cli("ros2", "--site", "floors", "--ros-args", "-p", "mode:=full").status == 0
+    assert lab.world.arguments.parameters == {"mode": "full", "site": str(tmp_path / "floors")}
+
+
 def test_ros2_refuses_wrong_arguments_in_one_line(cli, monkeypatch: pytest.MonkeyPatch) -> None:
     Lab(monkeypatch)
     ended = cli("ros2", "-p", "mode:=full")
@@ -49,5 +56,5 @@ def test_beside_a_page_the_node_starts_by_itself(monkeypatch: pytest.MonkeyPatch
     lab = Lab(monkeypatch)
     seen: dict[str, Any] = {}
     lab.world.during_spin = lambda node: seen.update(lab.world.arguments.parameters)
-    runner("ros2")("nowhere.yaml", ["--ros-args", "-p", "mode:=full"], None)
+    runner("ros2")({"yaml_filename": "nowhere.yaml"}, ["--ros-args", "-p", "mode:=full"], None)
     assert seen == {"mode": "full", "yaml_filename": "nowhere.yaml", "autostart": True}

@@ -16,6 +16,10 @@ from typing import Any
 
 import httpx
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "robots"))  # site_lab
+
+from site_lab import save_rooms
 from websockets.sync.client import connect
 
 Files = tuple[Path, Path]
@@ -100,6 +104,13 @@ def test_a_map_of_ones_own_is_served_read_only_with_a_token(unique: Files) -> No
         assert TOKEN not in out + err  # in no log
 
 
+@pytest.mark.slow
+def test_a_simulated_robot_in_a_site_is_served_with_the_name_of_its_map(tmp_path: Path) -> None:
+    with running("serve", "--site", save_rooms(tmp_path), "--port", 0) as (_, url):
+        wait_for(url, "LOCALIZED")
+        assert httpx.get(url + "v1/map").json()["name"] == "first"
+
+
 def assert_one_line(ended: Any, *words: str) -> None:
     assert (ended.status, ended.out) == (2, ""), ended
     assert ended.err.startswith("firstfix: ")
@@ -124,6 +135,9 @@ def test_a_port_that_is_taken(cli) -> None:
         (("house", "--host", "192.0.2.1", "--token", TOKEN), ("192.0.2.1",)),
         (("house", "--token", "short"), ("8 characters",)),
         (("house", "scan:=front"), ("scan:=front", "--robot")),
+        ((), ("either a map or --site",)),
+        (("house", "--site", "floors"), ("either a map or --site",)),
+        (("--site", "atlantis"), ("no folder or file", "atlantis")),
         (("atlantis",), ("office, rooms", "atlantis")),
         (("nomap.yaml",), ("no such file: nomap.yaml",)),
     ],

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from firstfix.cli.progress import working
-from firstfix.cli.serve import PORT, Address, Rest, serve_simulated
+from firstfix.cli.serve import PORT, Address, Building, Rest, serve_simulated
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -76,7 +76,8 @@ def demo(
     if headless:
         _run_scenario(grid, world, seed, picture)
     else:
-        serve_simulated(grid, Path(world).stem, seed, Address("127.0.0.1", port), Rest.SLEEPS)
+        building = Building(grid, Path(world).stem)
+        serve_simulated(building, seed, Address("127.0.0.1", port), Rest.SLEEPS)
 
 
 def _run_scenario(grid: OccupancyGrid, world: str, seed: int, plot: Path) -> None:

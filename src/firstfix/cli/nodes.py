@@ -21,6 +21,7 @@ from firstfix.cli.fleet_options import (
     SerialNumber,
     fleet_bridge,
 )
+from firstfix.cli.site import SiteOption
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ AFTER_DASHES = {"allow_extra_args": True}
 
 def ros1(
     context: typer.Context,
+    site: SiteOption = None,
     vda5050: FleetUrl = None,
     manufacturer: Manufacturer = None,
     serial_number: SerialNumber = None,
@@ -70,11 +72,12 @@ def ros1(
     with fleet_bridge(
         vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version
     ) as bridge:
-        adapter.run(context.args, _maker(bridge))
+        adapter.run([*context.args, *_for_ros1(own_site(site))], _maker(bridge))
 
 
 def ros2(
     context: typer.Context,
+    site: SiteOption = None,
     vda5050: FleetUrl = None,
     manufacturer: Manufacturer = None,
     serial_number: SerialNumber = None,
@@ -91,17 +94,14 @@ def ros2(
     with fleet_bridge(
         vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version
     ) as bridge:
-        adapter.run(context.args, _maker(bridge))
+        adapter.run([*context.args, *_for_ros2(own_site(site))], _maker(bridge))
 
 
 def dds(
     map_file: Annotated[
         Path | None, typer.Option("--map", help="Map to load; without it, the topic `map`.")
     ] = None,
-    site: Annotated[
-        Path | None,
-        typer.Option(help="site.yaml or folder of maps, in one of which the robot is."),
-    ] = None,
+    site: SiteOption = None,
     mode: Annotated[
         str | None,
         typer.Option(help="`bootstrap`: find the robot and start an AMCL; `full`: also track it."),
@@ -140,8 +140,7 @@ def dds(
     from firstfix.ros.arguments import names_from, settings_from
 
     names = names_from(remap or [], name, namespace)
-    options: dict[str, Any] = {"mode": mode, "base_frame_id": base_frame}
-    options["site"] = None if site is None else str(site)
+    options: dict[str, Any] = {"mode": mode, "base_frame_id": base_frame, **own_site(site)}
     options["yaml_filename"] = None if map_file is None else str(map_file)
     config = settings_from(
         node=names.node,
@@ -156,8 +155,8 @@ def dds(
         adapter.run(config, names, _maker(bridge))
 
 
-def runner(robot: str) -> Callable[[str, list[str], MakeNode], None]:
-    """Return a function that runs a node: path of the map, arguments of ROS, factory of the node.
+def runner(robot: str) -> Callable[[dict[str, str], list[str], MakeNode], None]:
+    """Return a function that runs a node: parameters, arguments of ROS, factory of the node.
 
     Raises
     ------
@@ -166,19 +165,18 @@ def runner(robot: str) -> Callable[[str, list[str], MakeNode], None]:
     """
     adapter = _load(robot)
 
-    def run(map_file: str, arguments: list[str], make_node: MakeNode) -> None:
+    def run(own: dict[str, str], arguments: list[str], make_node: MakeNode) -> None:
         if robot == "ros1":
-            adapter.run([*arguments, f"_yaml_filename:={map_file}"], make_node)
+            adapter.run([*arguments, *_for_ros1(own)], make_node)
         elif robot == "ros2":
-            given = ["-p", f"yaml_filename:={map_file}", "-p", "autostart:=true"]
-            adapter.run([*arguments, "--ros-args", *given], make_node)
+            adapter.run([*arguments, *_for_ros2({**own, "autostart": "true"})], make_node)
         else:
-            adapter.run(*_settings_of(arguments, map_file), make_node)
+            adapter.run(*_settings_of(arguments, own), make_node)
 
     return run
 
 
-def _settings_of(arguments: list[str], map_file: str) -> tuple[NodeConfig, Names]:
+def _settings_of(arguments: list[str], own: dict[str, str]) -> tuple[NodeConfig, Names]:
     """Read what follows ``--ros-args`` where no ROS reads it."""
     from firstfix.ros.arguments import names_from, settings_from
 
@@ -198,9 +196,23 @@ def _settings_of(arguments: list[str], map_file: str) -> tuple[NodeConfig, Names
         amcl_file=None,
         files=[Path(file) for file in values["--params-file"]],
         assignments=values["-p"],
-        options={"yaml_filename": map_file},
+        options=own,
     )
     return config, names
+
+
+def own_site(path: Path | None) -> dict[str, str]:
+    """Return the parameter of a node that ``--site`` sets; ROS may start it in another folder."""
+    return {} if path is None else {"site": f"{path.resolve()}"}
+
+
+def _for_ros1(own: dict[str, str]) -> list[str]:
+    return [f"_{name}:={value}" for name, value in own.items()]
+
+
+def _for_ros2(own: dict[str, str]) -> list[str]:
+    given = [word for name, value in own.items() for word in ("-p", f"{name}:={value}")]
+    return ["--ros-args", *given] if given else []
 
 
 def _maker(bridge: Bridge | None) -> MakeNode:

@@ -7,6 +7,7 @@ import sys
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,12 +23,14 @@ from firstfix.cli.fleet_options import (
     SerialNumber,
     fleet_bridge,
 )
+from firstfix.cli.site import SiteOption
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
     import socket
 
     from firstfix.core.grid import OccupancyGrid
+    from firstfix.site.site import Site
     from firstfix.vda5050.bridge import Bridge
     from firstfix.web.access_control import AccessPolicy
 
@@ -102,8 +105,10 @@ class Address:
 def serve(
     context: typer.Context,
     map_: Annotated[
-        str, typer.Argument(metavar="MAP", help="YAML of a map; for `sim` also a built-in world.")
-    ],
+        str | None,
+        typer.Argument(metavar="[MAP]", help="YAML of a map; for `sim` also a built-in world."),
+    ] = None,
+    site: SiteOption = None,
     robot: Annotated[Transport, typer.Option(help="Which robot is served.")] = Transport.SIM,
     host: Annotated[
         str, typer.Option(help="Address to listen on; others than loopback need a token.")
@@ -142,30 +147,48 @@ def serve(
             received=f"also {context.args[0]}",
             remedy="arguments of ROS go with --robot ros1, ros2 or dds",
         )
+    if (map_ is None) is (site is None):
+        raise InputError("Give either a map or --site SITE.")
     with fleet_bridge(
         vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version
     ) as bridge:
         if robot is Transport.SIM:
-            from firstfix.lab.worlds.catalog import world_or_map
-
-            grid, name = world_or_map(map_), Path(map_).stem
-            serve_simulated(grid, name, seed, address, Rest.AWAKE, bridge, keep_changes)
+            building = _building(map_) if site is None else _buildings(site)
+            serve_simulated(building, seed, address, Rest.AWAKE, bridge, keep_changes)
         else:
             kept = ["--ros-args", "-p", f"changes.days_kept:={keep_changes}"]
             arguments = [*context.args, *kept] if keep_changes else context.args
-            serve_robot(robot.value, Path(map_), arguments, address, bridge)
+            serve_robot(robot.value, _own_maps(map_, site), arguments, address, bridge)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Building:
+    """Where a simulated robot is.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+        The building.
+    name : str
+        Its name.
+    site : Site or None
+        All maps in which the robot may be; None: only this one.
+    """
+
+    grid: OccupancyGrid
+    name: str
+    site: Site | None = None
 
 
 def serve_simulated(
-    grid: OccupancyGrid,
-    name: str,
+    building: Building,
     seed: int,
     address: Address,
     rest: Rest,
     bridge: Bridge | None = None,
     keep_changes: int = 0,
 ) -> None:
-    """Serve the page of a simulated robot in a building called ``name`` until it is interrupted.
+    """Serve the page of a simulated robot in a building until it is interrupted.
 
     Raises
     ------
@@ -175,27 +198,29 @@ def serve_simulated(
     from firstfix.global_localization.searchable import check_searchable
     from firstfix.lab.live.simulated_node import SimulatedNode
     from firstfix.lab.live.simulated_robot import SimulatedRobot
+    from firstfix.lab.worlds.catalog import WORLDS
     from firstfix.localizer.config import ChangesConfig, LocalizerConfig
     from firstfix.web.command_executor import CommandExecutor
     from firstfix.web.page import Page
     from firstfix.web.server import listen, make_server
     from firstfix.web.snapshot_store import SnapshotStore
 
-    access = address.access()
-    check_searchable(grid)
+    access, site = address.access(), building.site
+    check_searchable(building.grid)
     with listen(address.host, address.port) as listening:
-        store = SnapshotStore(name)
+        store = SnapshotStore(building.name if site is None else "")
 
         def warn(text: str) -> None:
             typer.echo(text, err=True)
             store.add_event("warning", text.partition("\n")[0])
 
-        robot = SimulatedRobot(grid, seed, name)
+        worlds = WORLDS if site is None else {n: partial(site.grid, n) for n in site.map_ids}
+        robot = SimulatedRobot(building.grid, seed, building.name, worlds)
         if rest is Rest.SLEEPS:
             robot.pause()
         watchers = [] if bridge is None else [bridge]
         config = LocalizerConfig(changes=ChangesConfig(days_kept=keep_changes))
-        node = SimulatedNode(robot, store, warn, watchers, config)
+        node = SimulatedNode(robot, store, warn, watchers, config, site)
         if bridge is not None:
             bridge.attach(node.give)
         executor = CommandExecutor(store, node.give, robot)
@@ -215,35 +240,79 @@ def serve_simulated(
     raise typer.Exit(INTERRUPTED)
 
 
+def _building(map_: str | None) -> Building:
+    from firstfix.lab.worlds.catalog import world_or_map
+
+    return Building(world_or_map(f"{map_}"), Path(f"{map_}").stem)
+
+
+def _buildings(path: Path) -> Building:
+    """Load a site; the robot begins in its first map that can be used."""
+    from firstfix.cli.site import load_site, prepare_site
+
+    site = load_site(path)
+    prepare_site(site)
+    if not site.map_ids:
+        raise InputError(f"No map of {path} can be used. Look at: firstfix site check {path}")
+    name = site.map_ids[0]
+    return Building(site.grid(name), name, site)
+
+
+def _own_maps(map_: str | None, site: Path | None) -> dict[str, str]:
+    """Return the parameter of a node that names its map or its site, which are checked."""
+    from firstfix.cli.nodes import own_site
+    from firstfix.cli.site import load_site
+    from firstfix.global_localization.searchable import check_searchable
+    from firstfix.io.maps.map_server import load_map
+
+    if site is not None:
+        load_site(site)
+        return own_site(site)
+    path = Path(f"{map_}")
+    check_searchable(load_map(path))
+    return {"yaml_filename": f"{path.resolve()}"}
+
+
 def serve_robot(
     robot: str,
-    map_path: Path,
+    own: dict[str, str],
     arguments: list[str],
     address: Address,
     bridge: Bridge | None = None,
 ) -> None:
     """Run the node of a robot (ros1, ros2, dds) with arguments of ROS, and serve its page.
 
+    Parameters
+    ----------
+    robot : str
+        ros1, ros2 or dds.
+    own : dict of str to str
+        The parameter ``yaml_filename`` or ``site`` of the node.
+    arguments : list of str
+        Of ROS.
+    address : Address
+        Where the page is.
+    bridge : Bridge, optional
+        To a fleet control.
+
     Raises
     ------
     InputError
-        If the map or an argument cannot be used, or the page cannot be served at this address.
+        If an argument cannot be used, or the page cannot be served at this address.
     """
     from firstfix.cli.nodes import runner
-    from firstfix.global_localization.searchable import check_searchable
-    from firstfix.io.maps.map_server import load_map
     from firstfix.web.background_page import BackgroundPage
     from firstfix.web.server import listen
 
     access, run = address.access(), runner(robot)
-    check_searchable(load_map(map_path))
+    name = Path(own["yaml_filename"]).stem if "yaml_filename" in own else ""
     with listen(address.host, address.port) as listening:
         announce(listening, access)
         watchers = [] if bridge is None else [bridge]
-        with BackgroundPage(robot, map_path.stem, access, listening, watchers) as page:
+        with BackgroundPage(robot, name, access, listening, watchers) as page:
             if bridge is not None:
                 bridge.attach(page.give)
-            run(f"{map_path.resolve()}", arguments, page.make_node)
+            run(own, arguments, page.make_node)
 
 
 def announce(listening: socket.socket, access: AccessPolicy) -> None:

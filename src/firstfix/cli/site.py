@@ -26,6 +26,12 @@ site_app = typer.Typer(help="Many maps: which map, and where in it.", no_args_is
 SitePath = Annotated[
     Path, typer.Argument(metavar="SITE", help="Folder of map_server maps, or a site.yaml.")
 ]
+SiteOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="SITE", help="Maps in one of which the robot is: a folder or a site.yaml."
+    ),
+]
 
 
 @site_app.command(cls=PlainUsage)
@@ -54,14 +60,14 @@ def locate(
         from firstfix.lab.reports.output_files import check_picture
 
         check_picture(plot)
-    site = _load(site_path)
+    site = load_site(site_path)
     recording = read_log(scans, topic, laser_pose, base_frame, laser_frame, index + 1)
     instants = recording.instants()
     if index >= len(instants):
         raise ScanError(
             f"There is no scan {index} in {scans}. Choose one up to {len(instants) - 1}."
         )
-    _prepare(site)
+    prepare_site(site)
     result = site.locate([recording.scans[i] for i in instants[index]])
     if as_lines:
         typer.echo(json.dumps(result.to_dict(index), allow_nan=False))
@@ -97,7 +103,7 @@ def check(
         from firstfix.lab.reports.output_files import check_picture
 
         check_picture(plot)
-    site = _load(site_path)
+    site = load_site(site_path)
     steps = len(site.maps) * (2 if samples else 1)
     with progress(steps, "checking maps") as done:
         found = check_site(site, samples, seed, done)
@@ -137,14 +143,16 @@ def _check_lines(found: SiteCheck) -> list[str]:
     return lines
 
 
-def _load(path: Path) -> Site:
+def load_site(path: Path) -> Site:
+    """Load a site, whose prepared maps are in the folder of the user."""
     from firstfix.fields.cache import cache_folder
     from firstfix.site.site import Site
 
     return Site.load(path, cache_folder() / "sites")
 
 
-def _prepare(site: Site) -> None:
+def prepare_site(site: Site) -> None:
+    """Prepare all maps, and name those that cannot be used."""
     with progress(len(site.maps), "preparing maps") as done:
         site.prepare(done)
     for fault in site.faults.values():

@@ -28,7 +28,7 @@ class BackgroundPage:
     robot : str
         ros1, ros2 or dds.
     map_name : str
-        Name of the map.
+        Name of the map; empty: maps bring their own, as those of a site.
     access : AccessPolicy
         Who may see the page, and who may steer.
     listening : socket

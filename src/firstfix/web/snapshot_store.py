@@ -34,7 +34,7 @@ class SnapshotStore:
     Parameters
     ----------
     map_name : str
-        Name of the map.
+        Name of the map; empty: maps bring their own, as those of a site.
     """
 
     def __init__(self, map_name: str) -> None:
@@ -90,9 +90,8 @@ class SnapshotStore:
         self._notify()
 
     def set_map_name(self, name: str) -> None:
-        """Set the name of the next map."""
-        # A file name may have bytes that are not UTF-8, and JSON cannot have them.
-        self._map_name = name.encode(errors="replace").decode()
+        """Set the name of the next map; empty: maps bring their own, as those of a site."""
+        self._map_name = name
 
     def __call__(self, given: Input, outputs: list[Output], localizer: AnyLocalizer) -> None:
         """Store the outputs for an input; called by the localizer's thread."""
@@ -113,9 +112,10 @@ class SnapshotStore:
 
     def _store_map(self, given: NewMap, localizer: AnyLocalizer) -> None:
         if localizer.matcher is not None:
-            key = map_key(given.grid)
+            # A file name may have bytes that are not UTF-8, and JSON cannot have them.
+            name = (self._map_name or given.map_id).encode(errors="replace").decode()
             active_map = ActiveMap(
-                self._map_name, key, given.grid, localizer.matcher, localizer.changes
+                name, map_key(given.grid), given.grid, localizer.matcher, localizer.changes
             )
             self._snapshot = replace(self._snapshot, map=active_map)
 

@@ -62,7 +62,8 @@ class Timeline:
         if isinstance(given, NewMap):
             grid = given.grid
             size = f"{grid.width} x {grid.height} cells, {grid.free_area:.0f} m² free"
-            self.add(given.stamp, "map", f"Map received: {size}")
+            name = f"{given.map_id}, " if given.map_id else ""
+            self.add(given.stamp, "map", f"Map received: {name}{size}")
         elif isinstance(given, PoseHint):
             at = given.T_map_base
             self.add(given.stamp, "hint", f"Hint from {given.source}: ({at.x:.2f}, {at.y:.2f}) m")

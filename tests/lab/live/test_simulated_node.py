@@ -5,11 +5,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from live_lab import until
+from site_lab import save_rooms
 
 from firstfix.core.errors import InputError
 from firstfix.core.grid import FREE, OCCUPIED, OccupancyGrid
@@ -22,6 +25,7 @@ from firstfix.localizer.inputs import NewMap, PoseHint
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import InitialPose
 from firstfix.localizer.states import State
+from firstfix.site.site import Site
 from firstfix.web.snapshot import AmclEstimate, AmclStart
 
 HOUSE = WORLDS["house"]()
@@ -63,9 +67,11 @@ class Diary:
 
 
 @contextmanager
-def running(robot: SimulatedRobot, observer: Any = None) -> Iterator[tuple[SimulatedNode, Diary]]:
+def running(
+    robot: SimulatedRobot, observer: Any = None, site: Site | None = None
+) -> Iterator[tuple[SimulatedNode, Diary]]:
     diary = Diary(observer)
-    node = SimulatedNode(robot, diary, diary.warnings.append)
+    node = SimulatedNode(robot, diary, diary.warnings.append, site=site)
     node.start()
     yield node, diary
     node.stop()
@@ -79,6 +85,20 @@ def test_it_is_found_and_its_true_pose_is_sent():
     assert found.T_map_base.distance_to(diary.truths[20]) < 0.1
     assert diary.threads == {"firstfix"}
     assert diary.warnings == []
+
+
+def test_in_a_site_the_map_is_found_and_named_before_the_pose(tmp_path: Path) -> None:
+    site = Site.load(save_rooms(tmp_path))
+    worlds = {name: partial(site.grid, name) for name in site.map_ids}
+    robot = SimulatedRobot(site.grid("first"), 1, "first", worlds)
+    assert robot.worlds == ("first", "ground", "second")
+    with running(robot, site=site) as (_, diary):
+        until(lambda: diary.state is State.LOCALIZED)
+        robot.select_world("second")
+        until(lambda: len([g for g in diary.given if isinstance(g, NewMap)]) == 2)
+        until(lambda: diary.state is State.LOCALIZED)
+    assert [g.map_id for g in diary.given if isinstance(g, NewMap)] == ["first", "second"]
+    assert diary.warnings == diary.map_names == []
 
 
 def test_what_is_given_is_taken_at_once_also_while_the_robot_is_paused():

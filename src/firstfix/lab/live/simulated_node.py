@@ -15,14 +15,16 @@ from firstfix.lab.live.plain_amcl import PlainAmcl
 from firstfix.lab.live.simulated_robot import SimulatedRobot
 from firstfix.lab.simulation.simulation import PERIOD_S, Moment
 from firstfix.localizer.config import LocalizerConfig
-from firstfix.localizer.inputs import Input, NewMap
+from firstfix.localizer.inputs import Input, NewMap, Reset
 from firstfix.localizer.localizer import Localizer
-from firstfix.localizer.outputs import TrackedPose
+from firstfix.localizer.outputs import MapSwitched, Output, TrackedPose
 from firstfix.localizer.precompile import precompile
 from firstfix.ros.inbox import Inbox
 from firstfix.ros.incident_keeper import IncidentKeeper
 from firstfix.ros.node import Watcher
 from firstfix.ros.node_config import NodeConfig
+from firstfix.site.floors import AnyLocalizer, SiteLocalizer
+from firstfix.site.site import Site
 from firstfix.web.snapshot import AmclStart
 from firstfix.web.snapshot_store import SnapshotStore
 
@@ -50,6 +52,8 @@ class SimulatedNode:
         Others that watch the localizer.
     config : LocalizerConfig, optional
         Settings of the localizer.
+    site : Site, optional
+        The maps in one of which the robot is; by default only that of its world.
     """
 
     def __init__(
@@ -59,6 +63,7 @@ class SimulatedNode:
         warn: Callable[[str], None],
         watchers: Sequence[Watcher] = (),
         config: LocalizerConfig | None = None,
+        site: Site | None = None,
     ) -> None:
         self._robot = robot
         self._store = store
@@ -71,7 +76,8 @@ class SimulatedNode:
         self._path = robot.status.path
         self._known: SE2 | None = None  # the last published pose
         self._config = config
-        self._localizer = Localizer(config, cache_dir=cache_folder())
+        self._site = site
+        self._localizer = self._new_localizer()
         self._thread = threading.Thread(target=self._run, name="firstfix", daemon=True)
 
     def start(self) -> None:
@@ -90,7 +96,7 @@ class SimulatedNode:
 
     def _run(self) -> None:
         precompile()
-        self._try(self._handle, NewMap(0.0, self._robot.grid))
+        self._try(self._begin)
         due = time.monotonic()
         while not self._inbox.is_closed:
             for given in self._inbox.take(max(0.0, due - time.monotonic())):
@@ -134,15 +140,30 @@ class SimulatedNode:
         """Begin again in a world, whose clock starts at zero."""
         self._starts = self._robot.starts
         self._amcl = self._known = None
-        self._localizer = Localizer(self._config, cache_dir=cache_folder())
-        self._store.set_map_name(self._robot.status.world)
-        self._handle(NewMap(0.0, self._robot.grid))
+        self._localizer = self._new_localizer()
+        if self._site is None:
+            self._store.set_map_name(self._robot.status.world)
+        self._begin()
+
+    def _begin(self) -> None:
+        """Give the localizer its map, unless it has those of a site."""
+        self._handle(NewMap(0.0, self._robot.grid) if self._site is None else Reset(0.0))
+
+    def _new_localizer(self) -> AnyLocalizer:
+        if self._site is None:
+            return Localizer(self._config, cache_dir=cache_folder())
+        return SiteLocalizer(self._site, self._config, cache_folder())
 
     def _handle(self, given: Input) -> None:
         outputs = self._localizer.handle(given)
         for output in outputs:
             if isinstance(output, TrackedPose):
                 self._known = output.T_map_base
+            elif isinstance(output, MapSwitched):
+                self._tell(NewMap(output.stamp, output.grid, output.map_id), [])
+        self._tell(given, outputs)
+
+    def _tell(self, given: Input, outputs: list[Output]) -> None:
         for watch in self._watchers:
             watch(given, outputs, self._localizer)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
@@ -59,14 +59,23 @@ class SimulatedRobot:
     seed : int
         Seed of the simulation.
     world : str
-        Name of the building; the built-in worlds can be entered besides.
+        Name of the building.
+    worlds : mapping of str to callable
+        Buildings that can be entered besides; by default the built-in worlds.
     """
 
-    def __init__(self, grid: OccupancyGrid, seed: int, world: str = "map") -> None:
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        seed: int,
+        world: str = "map",
+        worlds: Mapping[str, Callable[[], OccupancyGrid]] = WORLDS,
+    ) -> None:
         self._seed = seed
         self._rng = np.random.default_rng(seed)
         self._lock = threading.Lock()
         self._given = world, grid
+        self._worlds = worlds
         self._sensor = next(iter(SENSORS))
         self._is_paused = self._is_covered = False
         self._amcl = AmclStart.OFF
@@ -101,7 +110,7 @@ class SimulatedRobot:
     @property
     def worlds(self) -> tuple[str, ...]:
         """Names of the worlds that `select_world` takes."""
-        return tuple(dict.fromkeys([self._given[0], *WORLDS]))
+        return tuple(dict.fromkeys([self._given[0], *self._worlds]))
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -234,7 +243,7 @@ class SimulatedRobot:
                 f"There is no world {name!r:.40}. Choose one of {', '.join(self.worlds)}."
             )
         given, grid = self._given
-        grid = grid if name == given else WORLDS[name]()
+        grid = grid if name == given else self._worlds[name]()
         with self._lock:
             self._enter(name, grid)
 
