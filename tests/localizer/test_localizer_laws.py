@@ -13,7 +13,7 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.lab.scenarios.phases import CarryTo, DriveTo, Stand, Teleport
 from firstfix.lab.scenarios.scenario import Scenario, run
-from firstfix.localizer import localizer as module
+from firstfix.localizer import map_localization as module
 from firstfix.localizer.inputs import NewMap, Reset
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import InitialPose, Status

@@ -12,6 +12,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.raycast import expected_ranges
 from firstfix.localizer.inputs import NewMap
 from firstfix.localizer.localizer import Localizer
+from firstfix.localizer.map_localization import MapLocalization
 from firstfix.localizer.outputs import InitialPose, Status, TrackedPose
 from firstfix.localizer.states import State
 
@@ -74,13 +75,13 @@ def used(monkeypatch) -> list[tuple[str, ...]]:
     """Note the sensors of each view that the localizer uses."""
     views: list[tuple[str, ...]] = []
     for name in ("_find", "_follow", "_verify_hint"):
-        original = getattr(Localizer, name)
+        original = getattr(MapLocalization, name)
 
         def spy(self, view, original=original):
             views.append(tuple(scan.sensor for scan in view.scans))
             return original(self, view)
 
-        monkeypatch.setattr(Localizer, name, spy)
+        monkeypatch.setattr(MapLocalization, name, spy)
     return views
 
 

@@ -62,7 +62,7 @@ def test_a_localizer_that_fails_is_replaced_and_searches_the_same_map(
 
     def fail_once(self, given):
         monkeypatch.setattr(Localizer, "handle", handle)
-        del self._tracker  # half-changed
+        del self._in_map  # half-changed
         raise ZeroDivisionError("by chance")
 
     monkeypatch.setattr(Localizer, "handle", fail_once)

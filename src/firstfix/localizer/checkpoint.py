@@ -24,6 +24,7 @@ from firstfix.global_localization.prior import Prior
 from firstfix.localizer.agreement import AgreementCounter
 from firstfix.localizer.hint import Hint
 from firstfix.localizer.localizer import Localizer
+from firstfix.localizer.map_localization import MapLocalization
 from firstfix.localizer.odometry_buffer import OdometryBuffer
 from firstfix.localizer.place_belief import PlaceBelief
 from firstfix.localizer.pose_monitor import PoseMonitor
@@ -35,18 +36,21 @@ from firstfix.localizer.states import State
 
 _PARTS: Mapping[type[Any], Mapping[str, Any]] = {
     Localizer: {
-        "_state": State,
         "_rng": np.random.Generator,
         "_scans": ScanQueue,
         "_view": View | None,
-        "_unweighed": tuple[View, Tracked] | None,
         "_lifted": set[SignalKind],
+        "_in_map": MapLocalization,
+    },
+    MapLocalization: {
+        "state": State,
+        "_unweighed": tuple[View, Tracked] | None,
         "_update_requested": bool,
         "_hint": Hint | None,
         "_chosen_by": str | None,
         "_lost_T_map_odom": SE2 | None,
-        "_tracker": PoseTracker,
-        "_places": PlaceBelief,
+        "tracker": PoseTracker,
+        "places": PlaceBelief,
     },
     ScanQueue: {
         "odometry": OdometryBuffer,
@@ -77,7 +81,8 @@ _PARTS: Mapping[type[Any], Mapping[str, Any]] = {
 }
 # What is made anew from the map and the settings, or does not change the outputs.
 _REBUILT: Mapping[type[Any], frozenset[str]] = {
-    Localizer: frozenset({"config", "_cache_dir", "_matcher", "_changes"}),
+    Localizer: frozenset({"config", "_cache_dir"}),
+    MapLocalization: frozenset({"matcher", "changes", "_config", "_scans"}),
     ScanQueue: frozenset({"_config"}),
     PoseTracker: frozenset({"_matcher", "_config", "_rng", "_filter"}),
     PoseMonitor: frozenset({"_matcher", "_config"}),
