@@ -34,6 +34,7 @@ class Recorder:
         self.published: list[tuple[Topic, Any]] = []
         self.lines: list[tuple[Severity, str]] = []
         self.threads: set[str] = set()
+        self.map_server: list[tuple[str, str]] | None = []  # calls; None: it is away
 
     def make(self, type_name: str, /, **fields: Any) -> Any:
         return self.wire.make(type_name, **fields)
@@ -46,6 +47,12 @@ class Recorder:
 
     def subscriber_count(self, topic: Topic) -> int:
         return self.listening.get(topic.name, 0)
+
+    def load_map(self, service: str, path: str) -> int:
+        if self.map_server is None:
+            raise OSError(f"there is no service {service}")
+        self.map_server.append((service, path))
+        return 0
 
     def log(self, severity: Severity, text: str) -> None:
         self.lines.append((severity, text))

@@ -19,7 +19,13 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.io.maps.map_server import save_map
 from firstfix.lab.worlds.catalog import identical_rooms
-from firstfix.ros.channels import INITIAL_POSE, PARTICLES, Channel, subscriptions
+from firstfix.ros.channels import (
+    INITIAL_POSE,
+    PARTICLES,
+    Channel,
+    published_topics,
+    subscriptions,
+)
 from firstfix.ros.node import Node
 from firstfix.ros.parameters import configured
 
@@ -101,6 +107,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "update_min_a": {"to": 2.0, "with": {"update_min_d": 3.0}},
     "random_seed": {"to": 7},
     "site": {"to": "."},
+    "load_map_service": {"to": "/map_server/load_map", "with": {"site": "."}},
     "deskew": {"to": False, "in": "a slow laser"},
     "changes.days_kept": {"to": 2},
     "locate.max_poses": {"to": 1000},
@@ -187,6 +194,7 @@ class Drive:
         node._check_scans()
         node._memory.close()
         topics = sorted(topic.name for _, topic in subscriptions(config))
+        topics += [topic.name for topic in published_topics(config, PARTICLES)]
         # What the live page shows of changes of the map.
         changes = f"changes: {node._localizer.changes is not None}"
         node.incidents.close()

@@ -156,7 +156,7 @@ def subscribed_topics(config: NodeConfig) -> dict[Channel, Topic]:
         topics[Channel.MAP_HINT] = Topic(
             "map_hint", "std_msgs/String", reliable, "the map that a lift names; a prior"
         )
-    elif not config.yaml_filename:
+    elif not config.has_own_maps:
         meaning = "the map, unless `yaml_filename` names a file"
         topics[Channel.MAP] = Topic(config.map_topic, grid, Delivery.LATCHED, meaning)
     return topics
@@ -218,7 +218,8 @@ def published_topics(config: NodeConfig, particles: Topic) -> tuple[Topic, ...]:
     tuple of Topic
         All of them.
     """
-    named = (MAP_ID, replace(MAP, name=config.map_topic)) if config.site else (MAP_ID,)
+    has_map = config.site and not config.load_map_service
+    named = (MAP_ID, replace(MAP, name=config.map_topic)) if has_map else (MAP_ID,)
     if config.mode is Mode.BOOTSTRAP:
         return (*named, INITIAL_POSE, HYPOTHESES, MARKERS, LOCALIZED, STATUS)
     moved = [TF] if config.tf_broadcast else []

@@ -11,6 +11,7 @@ from firstfix.io.maps.map_server import load_map
 from firstfix.io.maps.map_yaml import read_yaml
 from firstfix.localizer.inputs import NewMap
 from firstfix.ros.services import LoadResult
+from firstfix.site.site import Site
 
 _FOLDER_FILE = "map"
 
@@ -37,6 +38,21 @@ def map_from(path: Path) -> NewMap:
     grid = load_map(path)
     check_searchable(grid)
     return NewMap(0.0, grid, _name(path))
+
+
+def map_at(path: Path, site: Site) -> str | None:
+    """Return the id of the map of a site that a path names; None if it is none of them.
+
+    Parameters
+    ----------
+    path : Path
+        The YAML, or a folder with it.
+    site : Site
+        The maps.
+    """
+    asked = _yaml_of(path).resolve()
+    found = (name for name, entry in site.maps.items() if entry.path.resolve() == asked)
+    return next(found, None)
 
 
 def path_of(url: str) -> Path:
@@ -90,8 +106,12 @@ def result_of(path: Path) -> LoadResult:
     return LoadResult.INVALID_MAP_DATA
 
 
+def _yaml_of(path: Path) -> Path:
+    return path if path.suffix in (".yaml", ".yml") else path / f"{_FOLDER_FILE}.yaml"
+
+
 def _name(path: Path) -> str:
-    named = path if path.suffix in (".yaml", ".yml") else path / f"{_FOLDER_FILE}.yaml"
+    named = _yaml_of(path)
     return named.absolute().parent.name if named.stem == _FOLDER_FILE else named.stem
 
 

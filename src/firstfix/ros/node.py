@@ -8,6 +8,7 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,8 @@ from firstfix.ros.channels import SENSORS, Channel, subscribed_topics
 from firstfix.ros.exact_stamps import ExactStamps
 from firstfix.ros.inbox import Inbox
 from firstfix.ros.incident_keeper import IncidentKeeper
-from firstfix.ros.map_files import map_from, path_of, result_of
+from firstfix.ros.map_files import map_at, map_from, path_of, result_of
+from firstfix.ros.map_server_client import MapServerClient
 from firstfix.ros.message_converter import MessageConverter
 from firstfix.ros.node_config import NodeConfig
 from firstfix.ros.output_publisher import OutputPublisher
@@ -78,6 +80,7 @@ class Node:
             lambda text: self.warn_throttled("incidents", text),
         )
         self._site: Site | None = None
+        self._map_server: MapServerClient | None = None
         self._localizer = self._new_localizer()
         self._prior: Prior | None = None  # of the first search
         self._map: NewMap | None = None  # of yaml_filename, then the one in use
@@ -104,6 +107,8 @@ class Node:
     def stop(self) -> None:
         """Stop the worker after the message that it is handling, unless that takes long."""
         self._inbox.close()
+        if self._map_server is not None:
+            self._map_server.close()
         if self._worker.is_alive():
             self._worker.join(_STOP_S)
 
@@ -189,18 +194,33 @@ class Node:
     def _load_map(self, url: str) -> dict[str, Any]:
         try:
             loaded = map_from(path_of(url))
+            if self._site is not None:
+                self._name_map(self._site, path_of(url))
         except MapError as error:
             self.warn_throttled(f"map {url}", f"{error}")
             return {"result": int(_refusal(url))}
-        self.give(loaded)
+        if self._site is None:
+            self.give(loaded)
         frame = self._config.global_frame_id
         grid = occupancy_grid(self._transport.make, 0.0, frame, loaded.grid)
         return {"result": int(LoadResult.SUCCESS), "map": grid}
+
+    def _name_map(self, site: Site, path: Path) -> None:
+        """Take a request for one of the maps of a site as a hint: something knows the floor."""
+        map_id = map_at(path, site)
+        if map_id is None:
+            raise MapError(f"{path} is not a map of the site. Load one of its maps.")
+        self.receive(Channel.MAP_HINT, self._transport.make("std_msgs/String", data=map_id))
 
     def _load_own_map(self) -> None:
         if self._config.site:
             self._site = Site.load(self._config.site, cache_folder() / "sites")
             self._localizer = self._new_localizer()
+        if service := self._config.load_map_service:
+            self._map_server = MapServerClient(
+                partial(self._transport.load_map, service),
+                lambda text: self.warn_throttled(service, text),
+            )
         if self._config.yaml_filename:
             self._map = map_from(Path(self._config.yaml_filename))
             self._prior = self._prior_of_zones(self._map.grid)
@@ -303,6 +323,8 @@ class Node:
                 named = NewMap(output.stamp, output.grid, output.map_id)
                 self._memory.hint_after(named)  # whose poses it keeps; a site needs no hint
                 self._tell(named, [])
+                if self._map_server is not None and self._site is not None:
+                    self._map_server.ask(f"{self._site.maps[output.map_id].path.resolve()}")
         self._tell(given, outputs)
 
     def _tell(self, given: Input, outputs: list[Output]) -> None:

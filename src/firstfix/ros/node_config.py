@@ -44,6 +44,12 @@ class NodeConfig:
         "site.yaml or folder of maps, in one of which the robot is; the node publishes that map; "
         "empty: one map",
     )
+    load_map_service: str = setting(
+        "",
+        "service of a map server, such as /map_server/load_map or in ROS 1 /change_map, that is "
+        "called with the file of each map of a `site`, and publishes the map in place of this "
+        "node; empty: none",
+    )
     map_id: str = setting(
         "",
         "name of the first map, published on map_id; empty: the name of its file, or a hash of its "
@@ -132,11 +138,21 @@ class NodeConfig:
                 "site and yaml_filename are both set, but a site has maps of its own. Leave one of "
                 "them empty."
             )
+        if self.load_map_service and not self.site:
+            raise InputError(
+                "load_map_service is for the maps of a site, but site is empty. Set it, or leave "
+                "load_map_service empty."
+            )
         if self.zones and not self.yaml_filename:
             raise InputError(
                 "zones are in a file beside the map, but yaml_filename is empty. Set it, or leave "
                 "zones empty."
             )
+
+    @property
+    def has_own_maps(self) -> bool:
+        """True if the node loads its maps from files, not from a topic."""
+        return bool(self.yaml_filename or self.site)
 
     @property
     def band(self) -> tuple[float, float]:

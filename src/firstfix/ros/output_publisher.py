@@ -119,8 +119,13 @@ class OutputPublisher:
         self._transport.publish(MAP_ID, self._transport.make("std_msgs/String", data=map_id))
 
     def publish_map(self, switched: MapSwitched) -> None:
-        """Publish the name of the map that all later poses are in, then the map."""
+        """Publish the name of the map that all later poses are in, then the map.
+
+        The map itself is left to a map server, where one is told to load it.
+        """
         self.publish_map_id(switched.map_id)
+        if self._config.load_map_service:
+            return
         topic = replace(MAP, name=self._config.map_topic)
         grid = occupancy_grid(self._transport.make, switched.stamp, self._map, switched.grid)
         self._transport.publish(topic, grid)

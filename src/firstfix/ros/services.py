@@ -14,7 +14,10 @@ class Request(Enum):
     SEARCH = "discard the pose, and search the whole map"
     UPDATE = "use the next scan although the robot has not moved"
     HINT = "propose a pose; the next scan verifies it"
-    LOAD_MAP = "load a map from a file, by its path or a `file://` URL"
+    LOAD_MAP = (
+        "load a map from a file, by its path or a `file://` URL; with `site`, a hint that the "
+        "robot is in that map"
+    )
     SET_MAP = "use a map, and propose a pose in it"
     SAVE_INCIDENT = "save the last seconds in a file; the message is its path"
     WAIT = "answer once the robot is localized, for behaviour trees"
@@ -52,7 +55,7 @@ class Service:
     condition: str = field(default="", compare=False)
 
 
-_OWN_MAP = "with `yaml_filename`"
+_OWN_MAP = "with `yaml_filename` or `site`"
 _EMPTY = "std_srvs/Empty"
 _SEARCH = Service("reinitialize_global_localization", _EMPTY, Request.SEARCH)
 _UPDATE = Service("request_nomotion_update", _EMPTY, Request.UPDATE)
@@ -66,7 +69,7 @@ def ros2_services(config: NodeConfig) -> tuple[Service, ...]:
     Parameters
     ----------
     config : NodeConfig
-        A node that loads its map itself offers to load another one, as a map server does.
+        A node that loads its maps itself offers to load another one, as a map server does.
 
     Returns
     -------
@@ -75,7 +78,7 @@ def ros2_services(config: NodeConfig) -> tuple[Service, ...]:
     """
     hint = Service("set_initial_pose", "nav2_msgs/SetInitialPose", Request.HINT)
     load = Service("~/load_map", "nav2_msgs/LoadMap", Request.LOAD_MAP, _OWN_MAP)
-    return (_SEARCH, _UPDATE, hint, _SAVE, *([load] if config.yaml_filename else []))
+    return (_SEARCH, _UPDATE, hint, _SAVE, *([load] if config.has_own_maps else []))
 
 
 def ros1_services(config: NodeConfig) -> tuple[Service, ...]:
@@ -99,5 +102,5 @@ def ros1_services(config: NodeConfig) -> tuple[Service, ...]:
         Service(own + _UPDATE.name, _EMPTY, Request.UPDATE, beside),
         Service(own + "set_map", "nav_msgs/SetMap", Request.SET_MAP, beside),
         _SAVE,
-        *([load] if config.yaml_filename else []),
+        *([load] if config.has_own_maps else []),
     )

@@ -31,5 +31,14 @@ class Transport(Protocol):
     def subscriber_count(self, topic: Topic) -> int:
         """Count the subscribers of a topic."""
 
+    def load_map(self, service: str, path: str) -> int:
+        """Call ``LoadMap`` of a map server, and return its result; blocks for some seconds.
+
+        Raises
+        ------
+        OSError
+            If it does not answer.
+        """
+
     def log(self, severity: Severity, text: str) -> None:
         """Write a line for people."""

@@ -144,6 +144,31 @@ def test_a_map_that_cannot_be_loaded_leaves_the_one_in_use(
     assert len(lab.world.lines("warning")) == 5
 
 
+def test_a_map_server_is_told_the_map_of_the_site(
+    lab: Lab, hall_plan: OccupancyGrid, tmp_path: Path
+) -> None:
+    save_map(hall_plan, tmp_path / "ground.yaml")
+    other = replace(hall_plan, cells=hall_plan.cells[::-1])
+    save_map(other, tmp_path / "first.yaml")
+    service, asked = "/map_server/load_map", []
+    given = (f"site:={tmp_path}", f"load_map_service:={service}")
+    node = lab.node(*(word for each in given for word in ("-p", each)))
+    robot = Robot(lab, hall_plan, HERE)
+    node.trigger_configure()
+    node.trigger_activate()
+    assert [end.topic for end in lab.world.ends].count("/map") == 1  # that of the map server
+    robot.look_until(lambda: any(service in line for line in lab.world.lines("warning")))
+
+    def load(request: Any, response: Any) -> Any:
+        asked.append(request.map_url)
+        response.result = 0
+        return response
+
+    lab.world.services[service] = (lab.types.find("srv", "nav2_msgs/LoadMap"), load)
+    wait_until(lambda: asked)
+    assert asked == [f"{tmp_path / 'ground.yaml'}"]
+
+
 def test_only_a_node_that_loads_its_map_offers_to_load_another(lab: Lab) -> None:
     lab.node().trigger_configure()
     assert "~/load_map" not in lab.world.services

@@ -50,6 +50,11 @@ class Dds:
     particles = PARTICLES
 
     def __init__(self, config: NodeConfig, names: Names, domain: DomainSettings) -> None:
+        if config.load_map_service:
+            raise InputError(
+                "load_map_service needs services, which plain DDS has not. Leave it empty: the map "
+                "is published on a topic."
+            )
         self._config = config
         self._names = names
         self._threads: list[EventThread] = []
@@ -101,6 +106,10 @@ class Dds:
     def subscriber_count(self, topic: Topic) -> int:
         """Count the subscribers of a topic."""
         return self._senders[topic.name].subscriber_count
+
+    def load_map(self, service: str, path: str) -> int:
+        """Do nothing: there are no services."""
+        raise OSError(f"plain DDS has no service {service} for {path}")
 
     def log(self, severity: Severity, text: str) -> None:
         """Write a line to the console, in the form of ROS 2."""

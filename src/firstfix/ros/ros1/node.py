@@ -71,6 +71,14 @@ class Ros1:
         """Count the subscribers of a topic."""
         return int(self._publishers[topic.name].get_num_connections())
 
+    def load_map(self, service: str, path: str) -> int:
+        """Call ``nav_msgs/LoadMap`` of a map server (`Transport.load_map`)."""
+        try:
+            rospy.wait_for_service(service, timeout=_ASK_AGAIN_S)
+            return int(rospy.ServiceProxy(service, nav_msgs.srv.LoadMap)(path).result)
+        except (rospy.ROSException, rospy.ServiceException) as error:
+            raise OSError(f"{error}") from error
+
     def log(self, severity: Severity, text: str) -> None:
         """Write to the console and to rosout."""
         _LOG[severity]("%s", text)

@@ -30,6 +30,10 @@ from firstfix.ros.ros2.types import LATCHED, find, make, quality
 from firstfix.ros.services import LoadResult, Request, Service, ros2_services
 from firstfix.ros.transport import Severity
 
+_LOAD_MAP = "nav2_msgs/LoadMap"
+# A map server is waited for this long, s.
+_CALL_S = 2.0
+
 
 class Ros2:
     """A transport for `Node`: topics and services of a lifecycle node while it is configured.
@@ -70,6 +74,7 @@ class Ros2:
         }
         self._subscriptions: list[Any] = []
         self._services: list[Any] = []
+        self._map_server: Any | None = None
         self._bond: Bond | None = None
 
     def start(self, node: Node) -> None:
@@ -80,6 +85,9 @@ class Ros2:
         InputError
             If its map cannot be used, or a package of messages is missing.
         """
+        asked = self._config.load_map_service
+        if asked and (kind := self._find("srv", _LOAD_MAP, asked)) is not None:
+            self._map_server = self._owner.create_client(kind, asked)
         node.start()
         self._node = node
         self.deactivate()
@@ -128,6 +136,9 @@ class Ros2:
             self._owner.destroy_subscription(self._subscriptions.pop())
         while self._services:
             self._owner.destroy_service(self._services.pop())
+        if self._map_server is not None:
+            self._owner.destroy_client(self._map_server)
+            self._map_server = None
 
     def make(self, type_name: str, /, **fields: Any) -> Any:
         """Build a message."""
@@ -156,6 +167,17 @@ class Ros2:
         """Count the subscribers of a topic."""
         publisher = self._publishers.get(topic.name)
         return publisher.get_subscription_count() if publisher is not None and rclpy.ok() else 0
+
+    def load_map(self, service: str, path: str) -> int:
+        """Call ``nav2_msgs/LoadMap`` of a map server (`Transport.load_map`)."""
+        client, done = self._map_server, threading.Event()
+        if client is None or not client.wait_for_service(timeout_sec=_CALL_S):
+            raise OSError(f"there is no service {service}")
+        called = client.call_async(client.srv_type.Request(map_url=path))
+        called.add_done_callback(lambda _: done.set())
+        if not done.wait(_CALL_S):
+            raise OSError(f"{service} does not answer")
+        return int(called.result().result)
 
     def log(self, severity: Severity, text: str) -> None:
         """Write to the console and to rosout."""

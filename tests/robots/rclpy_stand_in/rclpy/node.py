@@ -17,6 +17,7 @@ from rclpy.exceptions import (
 )
 from rclpy.graph import End, RCLError, world
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.task import Future
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,24 @@ class Logger:
             raise ValueError("Logger severity cannot be changed between calls.")
         world.log.append((severity, message))
         return True
+
+
+class Client:
+    """Calls a service of `world.services` at once."""
+
+    def __init__(self, srv_type: Any, srv_name: str) -> None:
+        self.srv_type, self._name, self.is_destroyed = srv_type, srv_name, False
+
+    def wait_for_service(self, timeout_sec: float) -> bool:
+        assert not self.is_destroyed
+        assert timeout_sec > 0.0
+        return self._name in world.services
+
+    def call_async(self, request: Any) -> Future:
+        assert isinstance(request, self.srv_type.Request)
+        future = Future()
+        future.set_result(world.ask(self._name, request))
+        return future
 
 
 class Node:
@@ -164,6 +183,13 @@ class Node:
         assert srv_name not in world.services
         world.services[srv_name] = (srv_type, callback)
         return srv_name
+
+    def create_client(self, srv_type: Any, srv_name: str) -> Client:
+        return Client(srv_type, srv_name)
+
+    def destroy_client(self, client: Client) -> bool:
+        client.is_destroyed = True
+        return True
 
     def destroy_subscription(self, subscription: End) -> bool:
         world.leave(subscription)
