@@ -15,7 +15,6 @@ from firstfix.core.estimate import Verdict
 from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
-from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.inputs import (
@@ -31,23 +30,17 @@ from firstfix.localizer.outputs import InitialPose, MapSwitched, Output, Status,
 from firstfix.localizer.scan_queue import ScanQueue
 from firstfix.localizer.states import State
 from firstfix.site.arrival import Candidate, MapLocalizers, confirm
-from firstfix.site.lifts import KINDS, Lift, lift_at, sees_out, sees_same_floor, without_cabin
-from firstfix.site.map_belief import MapBelief, begin_maps, brings_news, look, predicted
+from firstfix.site.lifts import lift_at, sees_same_floor
 from firstfix.site.query import SitePrior
+from firstfix.site.ride import Ride, is_clear
 from firstfix.site.site import Site
 from firstfix.site.site_search import SiteSearch
 
 # Without a view for so long a lift may have moved, s.
 _GAP_S = 1.0
 
-# A floor that was chosen after a ride is weighed against the others for so many more views.
-_PROBATION_VIEWS = 12
-
 # A jump of the tracked pose by this is no correction: the robot may be in another map.
 _JUMP_M = 1.0
-
-# How well a lift is known to bring the robot to its other ends, m.
-_LIFT_RADIUS_M = 2.0
 
 
 class _Phase(Enum):
@@ -98,10 +91,8 @@ class SiteLocalizer:
         self._map_id: str | None = None
         self._T_map_odom = SE2.identity()
         self._view_at: float | None = None  # stamp of the last view
-        self._lift: Lift | None = None  # that the robot rides, or has just left
-        self._belief: MapBelief | None = None
-        self._probation = 0  # views for which the belief still watches a chosen floor
-        self._hinted: str | None = None
+        self._ride: Ride | None = None  # under way, or just over
+        self._hinted: str | None = None  # the map that is searched first
         self._candidate: Candidate | None = None
         self._state = State.SEARCHING
 
@@ -221,10 +212,8 @@ class SiteLocalizer:
             return [self._status(given.stamp, reason)]
         if self._phase is _Phase.TRACKING and named == self._map_id:
             return [self._status(given.stamp, f"{source} names the map in use")]
-        if self._lift is not None and self._lift.leads_to(named):
-            self._hinted = named
-            self._belief = self._candidate = None
-            self._phase = _Phase.RIDING
+        if self._ride is not None and self._ride.lift.leads_to(named):
+            self._begin_ride(Ride(self.site, self._ride.lift, named))
             reason = f"{source} says that this is {named}: the next view verifies it"
             return [self._open(given.stamp, reason)]
         reason = f"{source} says that this is {named}: searching there first"
@@ -245,7 +234,7 @@ class SiteLocalizer:
         if self._phase is _Phase.SEARCHING:
             return self._find(view)
         if self._phase is _Phase.RIDING:
-            return self._ride(view)
+            return self._weigh_floors(view, self._ride)
         return self._follow(view, was_blind=was_blind)
 
     # ---- one view in each phase
@@ -262,7 +251,7 @@ class SiteLocalizer:
             return []
         best = result.best
         if result.verdict is Verdict.UNIQUE and best is not None and result.map_id is not None:
-            if not self._is_clear(result.map_id, best.pose, view):
+            if self._hinted is None and not is_clear(self.site, result.map_id, best.pose, view):
                 reason = f"{result.map_id} fits best, but another floor differs in little"
                 return [self._open(view.stamp, reason)]
             found = self._localizers.propose(
@@ -274,58 +263,25 @@ class SiteLocalizer:
             self._state = State.SEARCHING
         return [self._status(view.stamp, result.reason)]
 
-    def _is_clear(self, map_id: str, T_map_base: SE2, view: View) -> bool:
-        """Tell whether a view fits much worse at the same place of the floors above and below."""
-        for transition in self.site.transitions:
-            for end in transition.ends:
-                if end.map_id == map_id and transition.kind in KINDS and self._hinted is None:
-                    lift = Lift(transition, end.pose)
-                    belief = begin_maps(self._places(lift, T_map_base), view)
-                    if belief is not None and not belief.is_clear(map_id):
-                        return False
-        return True
+    def _begin_ride(self, ride: Ride) -> Ride:
+        self._phase, self._ride, self._candidate = _Phase.RIDING, ride, None
+        return ride
 
-    def _ride(self, view: View) -> list[Output]:
-        """Weigh the floors of a lift by views that see out of it."""
-        lift = self._lift
-        assert lift is not None  # noqa: S101 - every way into this phase brings one
-        T_map_base = self._T_map_odom @ view.T_odom_base
-        if self._belief is not None:
-            best = self._belief.most_likely
-            lift, T_map_base = lift.seen_from(best), predicted(self._belief, best, view)
-            self._lift, self._T_map_odom = lift, T_map_base @ view.T_odom_base.inverse()
-        if lift.holds(T_map_base) and not sees_out(view, lift, T_map_base):
-            self._belief = self._candidate = self._hinted = None
-            reason = f"in {lift.transition.id}, which may move: waiting for its door to open"
-            return [self._open(view.stamp, reason)]
-        outside = without_cabin(view, lift, T_map_base)
-        if self._belief is None:
-            places = self._places(lift, T_map_base)
-            unseen = len(lift.transition.ends) - len(places)
-            self._belief = begin_maps(places, outside, unseen=unseen, hinted=self._hinted)
-            if self._belief is None:
-                return [self._open(view.stamp, f"no floor of {lift.transition.id} can be compared")]
-        else:
-            self._belief = look(self._belief, outside)
-        if self._belief.is_refuted:
-            return self._leave_lift(view, lift, self._belief)
-        chosen = self._belief.decided
-        if chosen is None:
+    def _weigh_floors(self, view: View, ride: Ride | None) -> list[Output]:
+        """Weigh the floors of a lift; hand over to the localizer of a map when one is left."""
+        assert ride is not None  # noqa: S101 - every way into this phase brings one
+        weighed = ride.weigh(view, self._T_map_odom @ view.T_odom_base)
+        self._T_map_odom = weighed.T_map_base @ view.T_odom_base.inverse()
+        if weighed.is_refuted:
+            return self._start_search(view.stamp, f"{weighed.reason}: searching all maps")
+        if weighed.chosen is None:
             self._candidate = None
-            return [self._open(view.stamp, _in_words(self._belief))]
-        if self._candidate is None or self._candidate.map_id != chosen:
-            self._candidate = self._localizers.propose(
-                chosen, self._belief.floors[chosen].T_map_base, view, lift.transition.id
-            )
-        return self._await(view, self._candidate, _in_words(self._belief))
-
-    def _leave_lift(self, view: View, lift: Lift, belief: MapBelief) -> list[Output]:
-        """Search all maps, unless the robot may be on a floor that has none."""
-        reason = f"the views fit no floor of {lift.transition.id}"
-        if not belief.unseen:
-            return self._start_search(view.stamp, f"{reason}: searching all maps")
-        self._belief = self._candidate = None
-        return [self._open(view.stamp, f"{reason} whose map can be used")]
+            return [self._open(view.stamp, weighed.reason)]
+        map_id, T_map_base = weighed.chosen
+        if self._candidate is None or self._candidate.map_id != map_id:
+            name = ride.lift.transition.id
+            self._candidate = self._localizers.propose(map_id, T_map_base, view, name)
+        return self._await(view, self._candidate, weighed.reason)
 
     def _await(self, view: View, candidate: Candidate, reason: str) -> list[Output]:
         """Publish the pose of a candidate once its localizer has verified it."""
@@ -339,16 +295,14 @@ class SiteLocalizer:
         return [self._open(view.stamp, f"probably in {candidate.map_id}: {reason}")]
 
     def _switch(self, view: View, candidate: Candidate, outputs: list[Output]) -> list[Output]:
-        rode = self._phase is _Phase.RIDING
+        if self._phase is _Phase.RIDING and self._ride is not None:
+            self._ride.end_at(candidate.map_id)
         self._phase, self._localizer = _Phase.TRACKING, candidate.localizer
-        self._probation = _PROBATION_VIEWS if rode and self._hinted is None else 0
         self._candidate = self._hinted = None
         self._note_pose(outputs)
         if candidate.map_id == self._map_id:
             return outputs
         self._map_id = candidate.map_id
-        if rode and self._lift is not None:
-            self._lift = self._lift.seen_from(self._map_id)
         return [MapSwitched(view.stamp, self._map_id, self.site.grid(self._map_id)), *outputs]
 
     def _follow(self, view: View, *, was_blind: bool) -> list[Output]:
@@ -360,28 +314,17 @@ class SiteLocalizer:
         if lift is not None and localizer.state is State.LOCALIZED:
             fields = self.site.fields(f"{self._map_id}")
             if was_blind or not sees_same_floor(view, lift, T_map_base, fields):
-                self._phase, self._lift, self._belief = _Phase.RIDING, lift, None
-                self._candidate = self._hinted = None
-                return self._ride(view)
-        if lift is None and self._belief is None:
-            self._lift = None
-        if not self._is_still_likely(view):
-            self._phase, self._candidate = _Phase.RIDING, None
+                return self._weigh_floors(view, self._begin_ride(Ride(self.site, lift)))
+        ride = self._ride
+        if ride is not None and not ride.is_still_likely(f"{self._map_id}", view):
+            self._begin_ride(ride)
             return [self._open(view.stamp, "another floor fits better now")]
+        if ride is not None and ride.is_over and lift is None:
+            self._ride = None
         outputs: list[Output] = []
         for scan in view.scans:
             outputs += self._of_localizer(scan, localizer)
         return outputs
-
-    def _is_still_likely(self, view: View) -> bool:
-        """Weigh a floor that was chosen lately against the others once more."""
-        if self._belief is None or self._probation <= 0:
-            self._belief = None
-            return True
-        if brings_news(self._belief, view):
-            self._probation -= 1
-            self._belief = look(self._belief, view)
-        return self._belief.probabilities[f"{self._map_id}"] >= 0.5 or self._belief.misses > 0
 
     def _of_localizer(self, given: Input, localizer: Localizer) -> list[Output]:
         """Return the outputs of the localizer of the map, or search all maps if it is lost."""
@@ -411,21 +354,12 @@ class SiteLocalizer:
             if isinstance(output, TrackedPose):
                 self._T_map_odom = output.T_map_odom
 
-    def _places(self, lift: Lift, T_map_base: SE2) -> dict[str, tuple[MapFields, SE2]]:
-        """Return the floors of a lift that can be used, each with the pose on it."""
-        found = {}
-        for map_id, pose in lift.places(T_map_base).items():
-            self.site.prepare_map(map_id)
-            if map_id not in self.site.faults:
-                found[map_id] = (self.site.fields(map_id), pose)
-        return found
-
     def _start_search(
         self, stamp: float, reason: str, prior: SitePrior | None = None
     ) -> list[Output]:
         self._phase, self._state = _Phase.SEARCHING, State.SEARCHING
         self._search = self._new_search(prior)
-        self._lift = self._belief = self._candidate = self._hinted = None
+        self._ride = self._candidate = self._hinted = None
         return [self._status(stamp, reason)]
 
     def _new_search(self, prior: SitePrior | None) -> SiteSearch:
@@ -442,9 +376,3 @@ class SiteLocalizer:
 
 AnyLocalizer = Localizer | SiteLocalizer
 """A localizer of one map, or of many: both have the same inputs, outputs and properties."""
-
-
-def _in_words(belief: MapBelief) -> str:
-    listed = sorted(belief.probabilities.items(), key=lambda item: -item[1])
-    shown = ", ".join(f"{name} {share:.0%}" for name, share in listed[:3] if share >= 0.005)
-    return f"which floor: {shown or 'none fits'}"
