@@ -78,12 +78,13 @@ def test_map_check_describes_a_map(cli, unique: Files) -> None:
 
 def test_map_check_warns_of_traps(cli, unique: Files, tmp_path: Path) -> None:
     text = unique[0].read_text().replace("mode: trinary\n", "")
-    (tmp_path / "map.yaml").write_text(text)
+    (tmp_path / "map.yaml").write_text(text.replace("resolution: 0.05", "resolution: 5.0"))
     for image in unique[0].parent.glob("*.pgm"):
         (tmp_path / image.name).write_bytes(image.read_bytes())
     ended = cli("map", "check", "map.yaml")
     assert ended.status == 0
-    assert "warning: mode is missing" in ended.out
+    assert ended.out.count("warning: ") == 1  # to leave mode out is as good
+    assert "warning: resolution 5.0 m is unusual" in ended.out
 
 
 def test_map_check_finds_a_place_that_is_like_no_other(cli, unique: Files) -> None:
@@ -167,7 +168,32 @@ def test_map_show_draws_here_and_never_over_the_map(cli, unique: Files, tmp_path
     ended = cli("map", "show", unique[0])
     assert ended.status == 0
     assert (tmp_path / "firstfix-map.png").exists()
-    assert str(tmp_path / "firstfix-map.png") in ended.out
+    assert str(tmp_path / "firstfix-map.png") in ended.err
+
+
+def test_maps_are_described_for_programs(cli, alike: Files, tmp_path: Path) -> None:
+    ended = cli("map", "check", alike[0], "--samples", 4, "--beams", 180, "--json")
+    document = json.loads(ended.out)
+    assert document["cells"] == [round(side / 0.05) for side in document["size_m"]]
+    assert document["warnings"] == []
+    assert document["aliasing"]["several_places"] == 1.0
+    pair = document["aliasing"]["pairs"][0]
+    assert abs(pair["pose"][0] - pair["other"][0]) == pytest.approx(8.0, abs=0.1)
+    shown = json.loads(cli("map", "show", alike[0], "--plot", "map.svg", "--json").out)
+    assert shown["cells"] == document["cells"]
+    assert Path(shown["picture"]) == tmp_path / "map.svg"
+
+
+def test_predictions_are_there_for_programs(cli, unique: Files) -> None:
+    sensor = ("--samples", 1, "--sensor", "360,8", "--sensor", "skewed-lidar")
+    document = json.loads(cli("map", "check", unique[0], *sensor, "--json").out)
+    assert document["aliasing"] is None
+    first, skewed = document["predictions"]
+    assert first["sensor"] == "360° x 8 m"
+    for found in (first, skewed):
+        for effort in ("scan", "turn", "metre"):
+            total = sum(found[answer][effort] for answer in ("right", "wrong", "open"))
+            assert total == pytest.approx(1.0)
 
 
 @pytest.fixture
@@ -197,6 +223,20 @@ def test_in_identical_rooms_the_demo_publishes_nothing_and_that_is_correct(cli) 
     sentence = "AMBIGUOUS: 4 identical rooms, 25 % each; published nothing. Correct."
     assert ended.out.count(sentence) == 3
     assert "correct" in ended.out.splitlines()[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("short_scenario")
+def test_the_demo_for_programs(cli, tmp_path: Path) -> None:
+    ended = cli("demo", "--world", "house", "--headless", "--seed", 3, "--json")
+    document = json.loads(ended.out)
+    assert (ended.status, document["succeeded"]) == (0, True)
+    assert [episode["wrong_finds"] for episode in document["episodes"]] == [0, 0, 0]
+    assert document["episodes"][0]["found_error"]["m"] < 0.1
+    assert Path(document["picture"]) == tmp_path / "firstfix-demo.png"
+    ended = cli("demo", "--json")
+    assert (ended.status, ended.err.count("\n")) == (2, 1)
+    assert "--headless" in ended.err
 
 
 @pytest.mark.slow
@@ -234,6 +274,13 @@ def test_the_doctor_prints_what_is_installed(cli) -> None:
     for word in ("firstfix", "python", "numpy", "numba", "matplotlib", "cache", "kernels", "ROS"):
         assert f"\n{word}" in f"\n{ended.out}"
     assert "ready after" in ended.out
+
+
+def test_the_doctor_reports_to_programs(cli, unique: Files) -> None:
+    document = json.loads(cli("doctor", unique[0], "--json").out)
+    assert document["works"] is True
+    assert {"firstfix", "python", "numpy", "kernels", "map", "ROS"} <= set(document["report"])
+    assert "no traps" in document["report"]["map"]
 
 
 def test_map_check_says_when_a_sensor_needs_a_second_view(cli, unique: Files) -> None:

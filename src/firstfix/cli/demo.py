@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import shutil
 import sys
@@ -15,6 +16,8 @@ from firstfix.cli.serve import PORT, Address, Building, Rest, serve_simulated
 from firstfix.core.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from firstfix.core.grid import OccupancyGrid
     from firstfix.lab.scenarios.demo import DemoStep, Episode
 
@@ -48,6 +51,9 @@ def demo(
             show_default="firstfix-demo.png",
         ),
     ] = None,
+    as_object: Annotated[
+        bool, typer.Option("--json", help="With --headless, print one JSON object.")
+    ] = False,
 ) -> None:
     """Simulate a Kobuki that wakes up at an unknown place of a building, and localize it.
 
@@ -64,51 +70,72 @@ def demo(
 
     picture = plot or Path("firstfix-demo.png")
     check_path(picture)
-    if plot is not None and not headless:
+    if not headless and (plot is not None or as_object):
         raise InputError(
-            expected="--plot with --headless",
-            received=f"--plot {plot} alone",
-            remedy="add --headless",
+            f"{'--json' if plot is None else '--plot'} is of the fixed scenario. Add --headless."
         )
     grid = world_or_map(world)
-    size = f"{grid.width * grid.resolution:.0f} x {grid.height * grid.resolution:.0f} m"
-    typer.echo(f"Building   {world}: {size}, {grid.free_area:.0f} m² free")
     if headless:
-        _run_scenario(grid, world, seed, picture)
+        _report(grid, world, _played(grid, seed), picture, as_object=as_object)
     else:
+        typer.echo(_building(world, grid))
         building = Building(grid, Path(world).stem)
         serve_simulated(building, seed, Address("127.0.0.1", port), Rest.SLEEPS)
 
 
-def _run_scenario(grid: OccupancyGrid, world: str, seed: int, plot: Path) -> None:
-    from firstfix.lab.reports.scenario_picture import draw_scenario
-    from firstfix.lab.scenarios.demo import run_demo, summarize_episodes
+def _building(world: str, grid: OccupancyGrid) -> str:
+    size = f"{grid.width * grid.resolution:.0f} x {grid.height * grid.resolution:.0f} m"
+    return f"Building   {world}: {size}, {grid.free_area:.0f} m² free"
+
+
+def _played(grid: OccupancyGrid, seed: int) -> list[DemoStep]:
+    from firstfix.lab.scenarios.demo import run_demo
     from firstfix.localizer.localizer import Localizer
     from firstfix.localizer.precompile import precompile
-    from firstfix.plots.figure import can_draw
 
     with working("compiling the kernels"):
         precompile()
     with working("simulating the robot"):
-        steps = list(run_demo(grid, seed, Localizer()))
+        return list(run_demo(grid, seed, Localizer()))
+
+
+def _report(
+    grid: OccupancyGrid, world: str, steps: list[DemoStep], plot: Path, *, as_object: bool
+) -> None:
+    from firstfix.lab.reports.demo_document import demo_document
+    from firstfix.lab.reports.scenario_picture import draw_scenario
+    from firstfix.lab.scenarios.demo import summarize_episodes
+    from firstfix.plots.figure import can_draw
+
     episodes = summarize_episodes(steps)
+    picture = draw_scenario(grid, steps, plot) if can_draw() else None
+    document = demo_document(world, episodes, steps, picture)
+    if as_object:
+        typer.echo(json.dumps(document, allow_nan=False))
+    else:
+        typer.echo(_building(world, grid))
+        for line in _story(world, episodes, steps, picture):
+            typer.echo(line)
+    if not document["succeeded"]:
+        raise typer.Exit(FAILED)
+
+
+def _story(
+    world: str, episodes: list[Episode], steps: list[DemoStep], picture: Path | None
+) -> Iterator[str]:
+    """Yield the demo in words."""
     places = "identical rooms" if world == "rooms" else "places fit equally well"
     for number, (episode, words) in enumerate(zip(episodes, _EPISODES, strict=False), 1):
-        typer.echo(f"\n{number}. {_opening(episode, words)}")
-        for line in _episode_lines(episode, places):
-            typer.echo(f"   {line}")
-    typer.echo(f"\nCPU        {_cpu_text(steps)}")
-    picture = "none, because matplotlib is missing: pip install 'firstfix[plot]'"
-    if can_draw():
-        picture = f"{draw_scenario(grid, steps, plot)}"
-    typer.echo(f"Picture    {picture}")
+        yield f"\n{number}. {_opening(episode, words)}"
+        yield from (f"   {line}" for line in _episode_lines(episode, places))
+    yield f"\nCPU        {_cpu_text(steps)}"
+    missing = "none, because matplotlib is missing: pip install 'firstfix[plot]'"
+    yield f"Picture    {picture or missing}"
     program = "firstfix" if shutil.which("firstfix") else f"{Path(sys.executable).name} -m firstfix"
-    typer.echo(f"Live page  run `{program} demo` and open the address that it prints")
+    yield f"Live page  run `{program} demo` and open the address that it prints"
     succeeded = all(episode.is_tracked or episode.is_correctly_ambiguous for episode in episodes)
     colour = typer.colors.GREEN if succeeded else typer.colors.RED
-    typer.echo(f"Result     {typer.style(_result_text(episodes), fg=colour, bold=True)}")
-    if not succeeded:
-        raise typer.Exit(FAILED)
+    yield f"Result     {typer.style(_result_text(episodes), fg=colour, bold=True)}"
 
 
 def _opening(episode: Episode, words: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.util
+import json
 import os
 import platform
 import socket
@@ -53,27 +54,35 @@ def doctor(
     map_path: Annotated[
         Path | None, typer.Argument(metavar="[MAP]", help="A map to try, as map_server reads it.")
     ] = None,
+    as_object: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Print what is installed, and whether caches, kernels, ROS and a map work.
 
     Exit status 1 if the kernels do not work, 2 if the map cannot be used.
     """
-    _print("firstfix", f"{__version__} in {Path(__file__).parents[1]}")
-    _print("python", f"{platform.python_version()} on {platform.platform()}, {sys.prefix}")
-    _print(
-        "cores", f"{os.cpu_count()}, {_usable_cores()} of them for this process; a scan takes one"
-    )
+    report: dict[str, str] = {}
+
+    def tell(title: str, text: str) -> None:
+        report[title] = text
+        if not as_object:
+            typer.echo(f"{title:<13}{text}")
+
+    tell("firstfix", f"{__version__} in {Path(__file__).parents[1]}")
+    tell("python", f"{platform.python_version()} on {platform.platform()}, {sys.prefix}")
+    tell("cores", f"{os.cpu_count()}, {_usable_cores()} of them for this process; a scan takes one")
     for package in PACKAGES:
-        _print(package, _version(package) or "missing: run pip install firstfix again")
+        tell(package, _version(package) or "missing: run pip install firstfix again")
     for package, without in EXTRAS.items():
-        _print(package, _version(package) or without)
-    _print("cache", _cache())
+        tell(package, _version(package) or without)
+    tell("cache", _cache())
     with working("compiling the kernels, which takes half a minute at most"):
         kernels, works = _kernels()
-    _print("kernels", kernels)
+    tell("kernels", kernels)
     if map_path is not None and works:
-        _print("map", _map(map_path))
-    _print("ROS", _ros())
+        tell("map", _map(map_path))
+    tell("ROS", _ros())
+    if as_object:
+        typer.echo(json.dumps({"works": works, "report": report}))
     if not works:
         raise typer.Exit(1)
 
@@ -86,10 +95,6 @@ def cache_advice(error: RuntimeError) -> str | None:
         "expected a folder where compiled kernels can be kept, received none that can be written; "
         "set NUMBA_CACHE_DIR to one"
     )
-
-
-def _print(title: str, text: str) -> None:
-    typer.echo(f"{title:<13}{text}")
 
 
 def _usable_cores() -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -62,11 +63,12 @@ Sensors = Annotated[
         "--sensor",
         metavar="SENSOR",
         help="FOV,RANGE (degrees, m), 2xFOV,RANGE for two lasers at opposite corners, two-lasers, "
-        "depth-camera or 3d-lidar; repeatable. Predicts how often one scan, one turn in place, "
-        "and one metre of driving are enough.",
+        "depth-camera, 3d-lidar or skewed-lidar; repeatable. Predicts how often one scan, one turn "
+        "in place, and one metre of driving are enough.",
         rich_help_panel=PREDICTION,
     ),
 ]
+AsObject = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Seed = Annotated[
     int, typer.Option(min=0, help="Of the places and the noise.", rich_help_panel=PANEL)
 ]
@@ -89,16 +91,18 @@ def check(
             rich_help_panel=PREDICTION,
         ),
     ] = None,
+    as_object: AsObject = False,
 ) -> None:
     """Load a map as map_server does: print its size, warn of traps, find places that look alike.
 
     A simulated sensor takes one scan at random places, and each scan is located in the whole map.
     With --sensor or --plot the robot also turns and drives where one scan is not enough.
     """
-    from firstfix.cli.map_prediction import print_predictions
+    from firstfix.cli.map_prediction import predictions
     from firstfix.io.maps.check import check_map
     from firstfix.io.maps.map_server import load_map
     from firstfix.lab.experiments.perceptual_aliasing import sensor
+    from firstfix.lab.reports.map_document import aliasing_document, check_document
     from firstfix.lab.reports.output_files import check_picture
     from firstfix.lab.simulation.rigs import Rig, parse_rig
 
@@ -106,17 +110,35 @@ def check(
     if plot is not None:
         check_picture(plot)
         rigs = rigs or [Rig((sensor(beams, fov, reach),), f"{fov:g}° x {reach:g} m")]
+    say = _nothing if as_object else typer.echo
     found = check_map(map_path)
-    _print_sizes(found)
+    for line in _sizes(found):
+        say(line)
     for warning in found.warnings:
-        typer.echo(f"warning: {warning}")
+        say(f"warning: {warning}")
     if not found.warnings:
-        typer.echo("no traps found")
+        say("no traps found")
+    document = {**check_document(found), "aliasing": None, "predictions": []}
     if rigs:
         samples = SAMPLES if samples is None else samples
-        print_predictions(load_map(map_path), rigs, samples, seed, plot)
+        grid = load_map(map_path)
+        document["predictions"] = predictions(grid, rigs, samples, seed, plot, say)
     elif samples != 0:
-        _print_aliasing(load_map(map_path), sensor(beams, fov, reach), samples, seed)
+        lidar = sensor(beams, fov, reach)
+        places, reason = _aliasing(load_map(map_path), lidar, samples, seed)
+        if reason:
+            typer.echo(reason, err=as_object)
+        if places is not None:
+            document["aliasing"] = aliasing_document(places)
+            for line in _lines(lidar, places):
+                say(line)
+    if as_object:
+        typer.echo(json.dumps(document, allow_nan=False))
+
+
+def _nothing(line: str) -> None:
+    """Print nothing: an object is printed instead."""
+    del line
 
 
 @map_app.command(cls=PlainUsage)
@@ -137,10 +159,12 @@ def show(
     fov: Fov = 360.0,
     reach: Reach = 12.0,
     seed: Seed = 0,
+    as_object: AsObject = False,
 ) -> None:
     """Draw a map as firstfix sees it: walls, free and unknown space, in the map frame."""
     from firstfix.io.maps.map_server import load_map
     from firstfix.lab.experiments.perceptual_aliasing import sensor
+    from firstfix.lab.reports.map_document import aliasing_document, size_document
     from firstfix.lab.reports.map_picture import draw_grid
     from firstfix.lab.reports.output_files import check_picture
 
@@ -149,12 +173,18 @@ def show(
     grid = load_map(map_path)
     size = f"{grid.width * grid.resolution:.2f} x {grid.height * grid.resolution:.2f} m"
     title = f"{map_path.name}: {size}, {grid.free_area:.1f} m² free"
-    typer.echo(f"{size}, {grid.width} x {grid.height} cells, {grid.free_area:.1f} m² free")
     places = _survey(grid, sensor(beams, fov, reach), samples, seed) if aliasing else ()
-    typer.echo(f"picture: {draw_grid(grid, target, title, places)}")
+    picture = draw_grid(grid, target, title, places)
+    if as_object:
+        alike = aliasing_document(places) if aliasing else None
+        document = {**size_document(grid), "picture": f"{picture}", "aliasing": alike}
+        typer.echo(json.dumps(document, allow_nan=False))
+    else:
+        typer.echo(f"{size}, {grid.width} x {grid.height} cells, {grid.free_area:.1f} m² free")
+    typer.echo(f"picture: {picture}", err=True)
 
 
-def _print_sizes(found: MapCheck) -> None:
+def _sizes(found: MapCheck) -> list[str]:
     origin = found.T_map_grid
     between = max(0.0, 1.0 - found.free - found.occupied - found.unknown)
     metres = f"{found.width_m:.2f} x {found.height_m:.2f} m"
@@ -171,8 +201,7 @@ def _print_sizes(found: MapCheck) -> None:
     ]
     if between > 0.0005:
         rows.append(("between", f"{between:.1%}"))
-    for title, text in rows:
-        typer.echo(f"{title:<12}{text}")
+    return [f"{title:<12}{text}" for title, text in rows]
 
 
 def _survey(grid: OccupancyGrid, lidar: Lidar, samples: int | None, seed: int) -> list[Place]:
@@ -183,30 +212,25 @@ def _survey(grid: OccupancyGrid, lidar: Lidar, samples: int | None, seed: int) -
         return survey(grid, lidar, samples, seed, done)
 
 
-def _print_aliasing(grid: OccupancyGrid, lidar: Lidar, samples: int | None, seed: int) -> None:
+def _aliasing(
+    grid: OccupancyGrid, lidar: Lidar, samples: int | None, seed: int
+) -> tuple[list[Place] | None, str]:
+    """Survey a map; return None and the reason where that cannot be done."""
     if samples is None and grid.cells.size > MOST_CELLS:
-        typer.echo(
+        return None, (
             f"Perceptual aliasing was not measured: {grid.cells.size / 1e6:.0f} million cells take "
             f"a minute or more. Ask for it with --samples {SAMPLES}."
         )
-        return
     try:
-        places = _survey(grid, lidar, samples, seed)
+        return _survey(grid, lidar, samples, seed), ""
     except MapError as error:
-        typer.echo(
+        return None, (
             "Perceptual aliasing cannot be measured: "
             f"expected {error.expected}, received {error.received}"
         )
-        return
-    typer.echo(
-        f"\nOne scan ({lidar.beams} beams over {math.degrees(lidar.fov):g}°, "
-        f"{lidar.range_max:g} m) at each of {len(places)} random places:"
-    )
-    for line in _lines(places):
-        typer.echo(line)
 
 
-def _lines(places: Sequence[Place]) -> list[str]:
+def _lines(lidar: Lidar, places: Sequence[Place]) -> list[str]:
     from firstfix.lab.experiments.perceptual_aliasing import Look, doubles, share
     from firstfix.lab.reports.text import pose_text
 
@@ -216,7 +240,10 @@ def _lines(places: Sequence[Place]) -> list[str]:
         Look.LOST: "too few beams hit: the range is too short, or free cells are outdoors",
         Look.MISTAKEN: "another place fits better",
     }
-    lines = [f"{look.value:<18}{share(places, look):6.1%}  {meaning[look]}" for look in Look]
+    fov = math.degrees(lidar.fov)
+    words = f"One scan ({lidar.beams} beams over {fov:g}°, {lidar.range_max:g} m)"
+    lines = [f"\n{words} at each of {len(places)} random places:"]
+    lines += [f"{look.value:<18}{share(places, look):6.1%}  {meaning[look]}" for look in Look]
     if any(place.needs_second_view for place in places):
         lines.append(
             "One scan of this sensor is never UNIQUE: it sees too little. The robot publishes a "

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -16,11 +16,17 @@ if TYPE_CHECKING:
     from firstfix.lab.simulation.rigs import Rig
 
 
-def print_predictions(
-    grid: OccupancyGrid, rigs: Sequence[Rig], samples: int, seed: int, plot: Path | None
-) -> None:
-    """Predict, print and draw what each sensor can do."""
+def predictions(
+    grid: OccupancyGrid,
+    rigs: Sequence[Rig],
+    samples: int,
+    seed: int,
+    plot: Path | None,
+    say: Callable[[str], None],
+) -> list[dict[str, Any]]:
+    """Predict, say and draw what each sensor can do; return it as JSON values."""
     from firstfix.lab.experiments.sensor_prediction import predict
+    from firstfix.lab.reports.map_document import prediction_document
     from firstfix.lab.reports.prediction_report import draw_predictions, prediction_text
 
     if samples == 0:
@@ -29,6 +35,7 @@ def print_predictions(
     for rig in rigs:
         with progress(samples, rig.words) as done:
             found.append((rig.words, predict(grid, rig, samples, seed, done)))
-        typer.echo("\n" + prediction_text(*found[-1], seed))
+        say("\n" + prediction_text(*found[-1], seed))
     if plot is not None:
         typer.echo(f"picture: {draw_predictions(grid, found, plot)}", err=True)
+    return [prediction_document(words, predicted) for words, predicted in found]

@@ -171,8 +171,8 @@ def test_origin_with_yaw(tmp_path):
     assert "yaw of 1.5 rad" in traps(tmp_path, drawn(), origin=[0, 0, 1.5])
 
 
-def test_missing_mode(tmp_path):
-    assert "mode is missing and read as trinary" in traps(tmp_path, drawn(), mode=None)
+def test_a_missing_mode_is_no_trap(tmp_path):
+    assert traps(tmp_path, drawn(), mode=None) == traps(tmp_path, drawn())
 
 
 def test_negate_in_mode_raw(tmp_path):

@@ -201,8 +201,6 @@ def _about_yaml(header: MapYaml) -> Iterator[str]:
             f"origin has a yaw of {header.T_map_grid.yaw:.4g} rad: firstfix applies it, but many "
             "tools ignore it; rotate the image instead if maps disagree"
         )
-    if "mode" not in header.keys:
-        yield "mode is missing and read as trinary, as servers do: add 'mode: trinary'"
     if header.negate and header.mode is MapMode.RAW:
         yield "negate is ignored in mode raw, here and in Nav2, but not in ROS 1: set 'negate: 0'"
     for key in header.keys:

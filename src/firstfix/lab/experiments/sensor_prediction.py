@@ -15,18 +15,22 @@ from numpy.typing import NDArray
 from firstfix.belief.belief import Belief, begin, update
 from firstfix.belief.view import View
 from firstfix.core.angles import FULL_TURN
+from firstfix.core.deskew import deskew
 from firstfix.core.estimate import Hypothesis, Verdict
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.pose_error import PoseError
+from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.core.trajectory import Trajectory
 from firstfix.fields.cache import cache_folder
 from firstfix.fields.raycast import expected_ranges
 from firstfix.global_localization.beams import FEWEST_HITS
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.global_localization.searchable import check_searchable
 from firstfix.lab.metrics.outcome import FOUND
+from firstfix.lab.simulation.floor import Floor
 from firstfix.lab.simulation.furniture import furnished
-from firstfix.lab.simulation.rigs import Rig
+from firstfix.lab.simulation.rigs import SWEEP_S, Rig, Shutter
 from firstfix.lab.simulation.robot import Kobuki
 from firstfix.lab.simulation.wheels import Wheels
 from firstfix.lab.worlds.catalog import random_free_poses
@@ -37,6 +41,8 @@ _DRIVE_STEPS_M = (0.35, 0.35, 0.3)
 # The robot faces a direction in which it can drive this far, if there is one.
 _ROOM_M = sum(_DRIVE_STEPS_M) + 0.4
 _DIRECTIONS = 16
+# Motion skews the scans of a LIDAR that turns.
+_SPEED_M_S, _RATE_RAD_S = 0.5, math.radians(45.0)
 
 # Real buildings have furniture and people that no map has.
 _FLOOR_PER_BOX_M2 = 20.0
@@ -176,7 +182,32 @@ def _views(
             return
         pose = pose @ SE2(length, 0.0, turn)
         T_odom_base = T_odom_base @ wheels.count(length, turn)
-        yield pose, View(rig.scans(world, pose, rng), T_odom_base)
+        motion = SE2(
+            _SPEED_M_S * SWEEP_S if length else 0.0, 0.0, _RATE_RAD_S * SWEEP_S * bool(turn)
+        )
+        yield pose, View(_moving_scans(world, pose, motion, rig, wheels, rng), T_odom_base)
+
+
+def _moving_scans(
+    world: OccupancyGrid,
+    pose: SE2,
+    motion: SE2,
+    rig: Rig,
+    wheels: Wheels,
+    rng: np.random.Generator,
+) -> tuple[LaserScan, ...]:
+    """Take the scans of a robot that moves; those that are skewed are straightened by its wheels.
+
+    The motion is that of the time of a sweep.
+    """
+    if rig.shutter is not Shutter.ROLLING:
+        return rig.scans(world, pose, rng)
+    counted = wheels.count(motion.x, motion.yaw)
+    odometry = Trajectory(
+        np.array([0.0, SWEEP_S]), np.stack([SE2.identity().as_array(), counted.as_array()])
+    )
+    skewed = rig.sweeps(Floor(world), pose, pose @ motion, rng)
+    return tuple(deskew(scan, odometry) for scan in skewed)
 
 
 def _answer(verdict: Verdict, best: Hypothesis | None, truth: SE2) -> Answer:

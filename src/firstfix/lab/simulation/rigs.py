@@ -9,12 +9,19 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
+from numpy.typing import NDArray
 
+from firstfix.core.angles import FULL_TURN
 from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.lab.simulation.floor import Floor
 from firstfix.lab.simulation.lidar import Lidar, NoReturn
+from firstfix.lab.simulation.sweep import NOBODY, sweep
+
+SWEEP_S = 0.1
+"""Time that a LIDAR takes for one turn."""
 
 
 class Shutter(Enum):
@@ -56,6 +63,45 @@ class Rig:
     ) -> tuple[LaserScan, ...]:
         """Take one scan of each sensor of a robot at rest; arguments as of `Lidar.scan`."""
         return self.named(lidar.scan(grid, T_map_base, rng, stamp) for lidar in self.lidars)
+
+    def sweeps(
+        self,
+        floor: Floor,
+        T_map_base: SE2,
+        T_map_base_after: SE2,
+        rng: np.random.Generator,
+        stamp: float = 0.0,
+        circles: NDArray[np.float64] = NOBODY,
+    ) -> tuple[LaserScan, ...]:
+        """Take one scan of each sensor of a robot that moves meanwhile.
+
+        Parameters
+        ----------
+        floor : Floor
+            Walls and furniture.
+        T_map_base, T_map_base_after : SE2
+            Pose at the first beam, and `SWEEP_S` later.
+        rng : numpy.random.Generator
+            Source of noise and dropouts.
+        stamp : float
+            Time of the first beam, s.
+        circles : ndarray, shape (n, 3)
+            People: x, y in the map frame, radius; m.
+        """
+        rolling = self.shutter is Shutter.ROLLING
+        after = T_map_base_after if rolling else None
+        scans = self.named(
+            sweep(
+                lidar, floor, T_map_base, rng, stamp=stamp, circles=circles, T_map_base_after=after
+            )
+            for lidar in self.lidars
+        )
+        if not rolling:
+            return scans
+        return tuple(
+            replace(scan, time_increment=SWEEP_S * lidar.angle_increment / FULL_TURN)
+            for scan, lidar in zip(scans, self.lidars, strict=True)
+        )
 
     def named(self, scans: Iterable[LaserScan]) -> tuple[LaserScan, ...]:
         """Give the scans of several sensors, in their order, the names of the sensors."""

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.core.angles import FULL_TURN
 from firstfix.core.odometry import Odometry, Signal
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.lab.simulation.floor import Floor
 from firstfix.lab.simulation.people import People
 from firstfix.lab.simulation.planner import Planner
-from firstfix.lab.simulation.rigs import Rig, Shutter
+from firstfix.lab.simulation.rigs import Rig
 from firstfix.lab.simulation.robot import Kobuki, Robot
-from firstfix.lab.simulation.sweep import NOBODY, sweep
+from firstfix.lab.simulation.sweep import NOBODY
 
 SCAN_HZ = 10
 ODOMETRY_HZ = 50
@@ -157,24 +156,10 @@ class Simulation:
         self, stamp: float, T_map_base: SE2, circles: NDArray[np.float64]
     ) -> list[LaserScan]:
         """Take one scan of each sensor, begun at a pose and ended at the present one."""
-        rolling = self.rig.shutter is Shutter.ROLLING
-        scans = self.rig.named(
-            sweep(
-                lidar,
-                self.floor,
-                T_map_base,
-                self._beams,
-                stamp=stamp,
-                circles=circles,
-                T_map_base_after=self.robot.T_map_base if rolling else None,
-            )
-            for lidar in self.rig.lidars
-        )
-        if not rolling:
-            return [*scans]
         return [
-            replace(scan, time_increment=PERIOD_S * lidar.angle_increment / FULL_TURN)
-            for scan, lidar in zip(scans, self.rig.lidars, strict=True)
+            *self.rig.sweeps(
+                self.floor, T_map_base, self.robot.T_map_base, self._beams, stamp, circles
+            )
         ]
 
     def step_silently(self, phase: str) -> Moment:
