@@ -135,3 +135,24 @@ def test_poses_of_another_time_are_refused(cli, changed: Path) -> None:
 def test_counts_that_cannot_be_used_are_refused(cli, changed: Path) -> None:
     ended = cli("map", "changes", "map.yaml", "log.npz", "--truth", "--earlier", "nowhere")
     assert_refused(ended, "has 0 files")
+
+
+def test_the_layer_helps_to_locate(cli, changed: Path) -> None:
+    cli("map", "changes", "map.yaml", "log.npz", "--truth", "--out", "found")
+    located = ("locate", "map.yaml", "log.npz", "--index", "20", "--json")
+    costs = [
+        json.loads(cli(*located, *more).out)["hypotheses"][0]["score"]
+        for more in ([], ["--changes", "found/changes.yaml"])
+    ]
+    assert costs[1] < costs[0]
+
+
+def test_changes_of_another_map_are_one_sentence(cli, changed: Path) -> None:
+    save_map(OccupancyGrid(np.zeros((9, 9), np.int8), 0.05), changed / "other.yaml")
+    ended = cli("locate", "map.yaml", "log.npz", "--changes", "other.yaml")
+    assert ended.status == 2
+    assert "another map" in ended.err
+    assert ended.err.count("\n") == 1
+    ended = cli("track", "map.yaml", "log.npz", "--changes", "other.yaml")
+    assert (ended.status, ended.err.count("\n")) == (2, 1)
+    assert "--start search" in ended.err

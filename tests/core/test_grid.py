@@ -104,3 +104,28 @@ def test_the_extent_is_the_bounding_box_in_the_map_frame(
 ) -> None:
     grid = OccupancyGrid(np.zeros((10, 20), np.int8), 0.1, SE2(*T_map_grid))
     assert grid.extent == pytest.approx(extent)
+
+
+def test_a_layer_marks_walls_that_are_gone_and_things_that_are_new() -> None:
+    grid = OccupancyGrid(np.array([[0, 100, -1, 0, 100]], np.int8), 0.5)
+    layer = OccupancyGrid(np.array([[100, 0, 100, -1, -1]], np.int8), 0.5)
+    marked = grid.with_changes(layer)
+    assert marked.changed is not None
+    assert marked.changed.tolist() == [[True, True, True, False, False]]
+    assert (marked.cells == grid.cells).all()
+    redrawn = OccupancyGrid(np.array([[100, 0, 100, 0, 100]], np.int8), 0.5)
+    assert (grid.with_changes(redrawn).changed == marked.changed).all()
+
+
+@pytest.mark.parametrize(
+    "layer",
+    [
+        OccupancyGrid(np.zeros((3, 4), np.int8), 0.5),
+        OccupancyGrid(CELLS * 0, 0.25),
+        OccupancyGrid(CELLS * 0, 0.5, SE2(0.1, 0.0, 0.0)),
+        OccupancyGrid(CELLS * 0, 0.5, SE2(0.0, 0.0, 0.1)),
+    ],
+)
+def test_changes_of_another_map_are_refused(layer: OccupancyGrid) -> None:
+    with pytest.raises(MapError, match="another map"):
+        OccupancyGrid(CELLS, 0.5).with_changes(layer)

@@ -191,3 +191,47 @@ def test_a_beam_along_a_wall_of_usual_thickness_goes_through_it(yard):
     south = np.array([2.0 / RESOLUTION, 0.3 / RESOLUTION, 0.0])
     through = [beam_classes(south, beam(grazing, r), yard)[0] for r in (length, length + 0.3)]
     assert BeamClass.THROUGH_WALL in through
+
+
+# ---- what is known to have changed
+
+# The wall east of the sensor is gone; a cabinet stands north of it.
+WHERE = {"gone": (slice(50, 70), slice(120, 124)), "new": (slice(78, 84), slice(36, 46))}
+
+
+@pytest.fixture(scope="module")
+def changed_yard(yard) -> MapFields:
+    cells = np.full_like(yard.grid.cells, UNKNOWN)
+    cells[WHERE["gone"]], cells[WHERE["new"]] = 0, OCCUPIED
+    return MapFields(yard.grid.with_changes(OccupancyGrid(cells, RESOLUTION)))
+
+
+@pytest.mark.parametrize(
+    ("bearing", "range_m", "hit"),
+    [
+        (EAST, 5.5, True),  # through the wall that is gone
+        (EAST, 10.0, False),
+        (NORTH, 0.95, True),  # at the cabinet
+    ],
+)
+def test_a_beam_that_meets_a_known_change_contradicts_less(
+    yard, changed_yard, bearing, range_m, hit
+):
+    before = cost(yard, bearing, range_m, hit=hit)
+    assert cost(changed_yard, bearing, range_m, hit=hit) < 0.6 * before
+    counts = verify(SENSOR, beam(bearing, range_m, hit=hit), changed_yard).counts
+    assert counts[0, BeamClass.UNKNOWN] == 1
+
+
+@pytest.mark.parametrize(
+    ("bearing", "range_m", "hit"),
+    [
+        (EAST, 4.02, True),  # at the wall, should it still be there
+        (EAST, 1.0, True),  # a person in front of it
+        (0.7, 5.5, True),  # through the wall, where it is not known to be gone
+        (WEST, 10.0, False),
+    ],
+)
+def test_other_beams_cost_the_same_to_the_last_bit(yard, changed_yard, bearing, range_m, hit):
+    same = cost(yard, bearing, range_m, hit=hit)
+    assert cost(changed_yard, bearing, range_m, hit=hit) == same

@@ -104,6 +104,15 @@ def test_several_places_that_look_alike_are_repeated(three_rooms, robot_in, maps
     assert_identical(recorded.take(), maps_cache)
 
 
+def test_known_changes_are_saved_with_the_map(recorded):
+    world = recorded.robot.world
+    gone = OccupancyGrid(np.zeros_like(world.cells), world.resolution, world.T_map_grid)
+    recorded.robot.send(NewMap(recorded.robot.stamp, world.with_changes(gone)))
+    recorded.robot.ticks(1)
+    saved = from_document(*through_json(recorded.take()))
+    assert (saved.incident.map.grid.changed == world.occupied).all()
+
+
 def test_a_flipped_bit_in_an_output_is_noticed(recorded, maps_cache):
     recorded.robot.ticks(5)
     document, arrays = through_json(recorded.take())

@@ -2,15 +2,17 @@
 
 import math
 
+import numpy as np
 import pytest
 from recorder import BASE, LASER, Speaker
 
 from firstfix.core.errors import InputError
+from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.io.maps.map_server import save_map
 from firstfix.io.ros_messages.outgoing import transforms
-from firstfix.localizer.inputs import Reset
+from firstfix.localizer.inputs import NewMap, Reset
 from firstfix.localizer.states import State
 from firstfix.ros.channels import Channel
 from firstfix.ros.transport import Severity
@@ -56,4 +58,31 @@ def test_a_search_begins_in_the_zones(run, ros2, hall_plan, map_file):
 def test_a_zone_that_is_not_there_is_refused_at_the_start(run, map_file, zones, words):
     node = run(start=False, yaml_filename=str(map_file), zones=zones)
     with pytest.raises(InputError, match=words):
+        node.node.start()
+
+
+def layer_of(plan, path, rows=slice(None)):
+    """Write that all walls are gone."""
+    save_map(OccupancyGrid(np.zeros_like(plan.cells[rows]), plan.resolution, plan.T_map_grid), path)
+    return str(path)
+
+
+def test_what_has_changed_is_known_in_any_map_of_these_cells(run, ros2, hall_plan, tmp_path):
+    robot = Speaker(ros2, hall_plan, SE2(4.0, 3.0, 1.0))
+    node = run(changes_layer=layer_of(hall_plan, tmp_path / "changes.yaml"))
+    node.receive(Channel.MAP, robot.map())
+    node.wait_until_handled(NewMap)
+    assert node.given(NewMap)[0].grid.changed.any()
+    robot.world = OccupancyGrid(hall_plan.cells[:-10], hall_plan.resolution, hall_plan.T_map_grid)
+    node.receive(Channel.MAP, robot.map())
+    node.wait_until_handled(NewMap, 2)
+    assert node.given(NewMap)[1].grid.changed is None
+    (line,) = node.recorder.logged(Severity.WARNING)
+    assert "changes_layer is not used" in line
+
+
+def test_changes_of_another_map_file_are_refused_at_the_start(run, hall_plan, map_file, tmp_path):
+    layer = layer_of(hall_plan, tmp_path / "changes.yaml", slice(10, None))
+    node = run(start=False, yaml_filename=str(map_file), changes_layer=layer)
+    with pytest.raises(InputError, match="another map"):
         node.node.start()

@@ -61,6 +61,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "zones": {"to": "last", "in": "rooms", "with": {"yaml_filename": "rooms.yaml"}},
     "map_topic": {"to": "floor_plan"},
     "first_map_only": {"to": True},
+    "changes_layer": {"to": "all_gone.yaml"},
     "set_initial_pose": {"to": True},
     "initial_pose.x": {"to": 7.0, "with": START},
     "initial_pose.y": {"to": 5.5, "with": START},
@@ -184,7 +185,7 @@ class Drive:
         recorder.listening = {PARTICLES.name: 1, INITIAL_POSE.name: 1}
         node = Node(config, recorder)
         shutil.rmtree(node.incidents.folder.path, ignore_errors=True)  # it keeps 20 at most
-        if config.yaml_filename:
+        if config.yaml_filename or config.changes_layer:
             node._load_own_map()
         node._prepare()
         for channel, message in self.messages:
@@ -235,6 +236,7 @@ def outcome(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     tmp_path_factory: pytest.TempPathFactory,
+    hall_plan: OccupancyGrid,
 ) -> Callable[[str, dict[str, Any]], list[str]]:
     monkeypatch.setattr("firstfix.ros.node.precompile", lambda config: None)
     monkeypatch.setattr(
@@ -244,6 +246,10 @@ def outcome(
     monkeypatch.chdir(tmp_path)
     save_map(OccupancyGrid(np.eye(50, dtype=np.int8) * 100, 0.05), tmp_path / "map.yaml")
     save_map(identical_rooms(4), tmp_path / "rooms.yaml")
+    save_map(
+        OccupancyGrid(np.zeros_like(hall_plan.cells), hall_plan.resolution, hall_plan.T_map_grid),
+        tmp_path / "all_gone.yaml",
+    )
     zone = "zones: {last: [[24, 0], [32, 0], [32, 8], [24, 8]]}"
     (tmp_path / "rooms.zones.yaml").write_text(zone)
 

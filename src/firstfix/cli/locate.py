@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from firstfix.cli.answer import print_answer
+from firstfix.cli.known_changes import KnownChanges, load_changed_map
 from firstfix.cli.prior_options import NearPoses, Radius, RegionText, prior_of
 from firstfix.cli.progress import progress, working
 from firstfix.cli.sensor_options import (
@@ -55,6 +56,7 @@ def locate(
     near: NearPoses = None,
     radius: Radius = None,
     region: RegionText = None,
+    changes: KnownChanges = None,
 ) -> None:
     """Find the pose at which a scan was taken, anywhere in the map.
 
@@ -65,10 +67,9 @@ def locate(
     _check_options(index, every, plot)
     prior = prior_of(map_path, near, radius, region)
     from firstfix.core.estimate import Verdict
-    from firstfix.io.maps.map_server import load_map
     from firstfix.lab.experiments.case import truth_at
 
-    grid = load_map(map_path)
+    grid = load_changed_map(map_path, changes)
     first = index or 0
     # The scan of another sensor that is nearest in time may come later.
     several = topic is not None and len(topic) > 1

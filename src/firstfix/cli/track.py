@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from firstfix.cli.known_changes import KnownChanges, load_changed_map
 from firstfix.cli.prior_options import NearPoses, Radius, RegionText, prior_of
 from firstfix.cli.progress import progress
 from firstfix.cli.sensor_options import (
@@ -66,6 +67,7 @@ def track(
     near: NearPoses = None,
     radius: Radius = None,
     region: RegionText = None,
+    changes: KnownChanges = None,
     keep_pose: Annotated[
         Path | None,
         typer.Option(
@@ -95,9 +97,12 @@ def track(
         raise InputError(
             "--near and --region say where a search begins. Add --start search, or leave them out."
         )
-    from firstfix.io.maps.map_server import load_map
-
-    grid = load_map(map_path)
+    if changes is not None and requested != SEARCH:
+        raise InputError(
+            "--changes is used by the search, not by a track from a known start. Add --start "
+            "search, or leave it out."
+        )
+    grid = load_changed_map(map_path, changes)
     if prior is not None:
         prior.check(grid)
     recording = read_log(log, topic, laser_pose, base_frame, laser_frame, None, height_band)

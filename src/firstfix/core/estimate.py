@@ -54,7 +54,7 @@ class Evidence:
     through_wall : float
         Beams that pass through a wall: strong evidence against the pose.
     unknown : float
-        Beams that end in unknown space or outside the map.
+        Beams that end in unknown space, outside the map, or at a cell known to have changed.
     beams : int
         Number of beams used.
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from firstfix.core.angles import angle_error
 from firstfix.core.arguments import as_pose
 from firstfix.core.errors import MapError
 from firstfix.core.se2 import SE2
@@ -24,6 +25,9 @@ FREE_UP_TO = 25
 
 # A float32 distance field of this many cells takes 2 GB: larger maps are an error or an attack.
 MAX_CELLS = 500_000_000
+
+# Files write the yaw of a map with at least this many digits.
+_SAME_YAW_RAD = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +46,8 @@ class OccupancyGrid:
     unseen : ndarray of bool, shape (height, width), or None
         Free cells that were never observed, where the file distinguishes them: map savers write
         grey 205 for unknown, which ``free_thresh: 0.25`` reads as free. Made read-only.
+    changed : ndarray of bool, shape (height, width), or None
+        Cells that are known to be different in the building (`with_changes`). Made read-only.
 
     Raises
     ------
@@ -63,6 +69,7 @@ class OccupancyGrid:
     resolution: float
     T_map_grid: SE2 = field(default_factory=SE2.identity)
     unseen: NDArray[np.bool_] | None = None
+    changed: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         cells = np.ascontiguousarray(self.cells)
@@ -96,14 +103,17 @@ class OccupancyGrid:
         object.__setattr__(self, "cells", cells)
         object.__setattr__(self, "resolution", float(self.resolution))
         object.__setattr__(self, "T_map_grid", as_pose(self.T_map_grid, "T_map_grid"))
-        if self.unseen is not None:
-            if self.unseen.shape != cells.shape or self.unseen.dtype != np.bool_:
+        for name in ("unseen", "changed"):
+            mask = getattr(self, name)
+            if mask is None:
+                continue
+            if mask.shape != cells.shape or mask.dtype != np.bool_:
                 raise MapError(
-                    expected=f"unseen as bool of the shape of the cells, {cells.shape}",
-                    received=f"{self.unseen.dtype} of shape {self.unseen.shape}",
+                    expected=f"{name} as bool of the shape of the cells, {cells.shape}",
+                    received=f"{mask.dtype} of shape {mask.shape}",
                     remedy="leave it out if it is not known",
                 )
-            object.__setattr__(self, "unseen", _read_only(self.unseen.copy()))
+            object.__setattr__(self, name, _read_only(mask.copy()))
 
     @property
     def height(self) -> int:
@@ -135,6 +145,44 @@ class OccupancyGrid:
         """Unknown and unseen cells, shape (height, width)."""
         unknown = self.cells == UNKNOWN
         return _read_only(unknown if self.unseen is None else unknown | self.unseen)
+
+    def with_changes(self, layer: OccupancyGrid) -> OccupancyGrid:
+        """Return this map with the cells marked that a layer shows otherwise.
+
+        Beams that end in such a cell, or that this map lets end there, contradict a pose less.
+
+        Parameters
+        ----------
+        layer : OccupancyGrid
+            What ``firstfix map changes`` writes, of the same cells: occupied where something is
+            new, free where a wall is gone, unknown elsewhere. A redrawn map does as well.
+
+        Raises
+        ------
+        MapError
+            If it has other cells than this map.
+
+        Examples
+        --------
+        >>> cells = grid.cells.copy()
+        >>> cells[20:24, 30:34] = 100  # a new cabinet
+        >>> int(grid.with_changes(ff.OccupancyGrid(cells, grid.resolution)).changed.sum())
+        16
+        """
+        near = 0.01 * self.resolution
+        is_same_place = self.T_map_grid.distance_to(layer.T_map_grid) <= near
+        if not (
+            layer.cells.shape == self.cells.shape
+            and math.isclose(layer.resolution, self.resolution, rel_tol=1e-6)
+            and is_same_place
+            and angle_error(layer.T_map_grid.yaw, self.T_map_grid.yaw) <= _SAME_YAW_RAD
+        ):
+            raise MapError(
+                f"The changes are of another map: {layer!r} at {layer.T_map_grid!r} instead of "
+                f"{self!r} at {self.T_map_grid!r}. Make them anew with 'firstfix map changes'."
+            )
+        changed = (layer.occupied & ~self.occupied) | (layer.free & self.occupied)
+        return replace(self, changed=changed)
 
     @property
     def extent(self) -> tuple[float, float, float, float]:

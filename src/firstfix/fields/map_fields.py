@@ -30,6 +30,9 @@ from firstfix.fields.search_grid import (
 # Farther than any refinement reaches for a wall.
 NEAR_M = 1.0
 
+# Noise and error of the pose put the end of a beam this far from what it hit.
+_CHANGE_M = 0.1
+
 # Of the arrays in the folder of fields.
 _VERSION = "fields 3"
 _SETTINGS = repr((SPACING_M, BLOCKS, DIRECTIONS, UNIT_M, REACH_M, NEAR_M, MAX_LIMIT))
@@ -138,6 +141,14 @@ class MapFields:
             return _read_only(build())
         key = cache.content_key(_VERSION, self._content, name, _SETTINGS)
         return _read_only(cache.load_or_build(key, build, self.cache_dir, self.cache_limit))
+
+    @cached_property
+    def changed(self) -> NDArray[np.bool_]:
+        """Cells that are known to have changed, or next to one; shape (0, 0) if none are known."""
+        if self.grid.changed is None:
+            return _read_only(np.zeros((0, 0), np.bool_))
+        reach = max(1, round(_CHANGE_M / self.grid.resolution))
+        return _read_only(truncated_squares(self.grid.changed, reach + 1) <= reach**2)
 
     @property
     def nbytes(self) -> int:

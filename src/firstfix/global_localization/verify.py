@@ -34,6 +34,12 @@ _THROUGH_LIMIT_M = 1.0
 _SHORT_LIMIT_M = 0.4
 _INSIDE_WALL_COST = 6.0
 
+# A beam that meets a cell known to have changed says little: it contradicts a pose by this at most.
+# docs/decisions/0025 has the measurements.
+_CHANGED_COST = 1.2
+# A ray ends on the side of a wall; its cell is a little farther.
+_IN_WALL_CELLS = 0.1
+
 # A missing return may be glass or black paint: half the weight of a hit.
 _NO_RETURN_WEIGHT = 0.5
 
@@ -197,12 +203,30 @@ def _compared(
         fields.squares,
         fields.distances * np.float32(fields.grid.resolution),
         fields.grid.unknown,
+        fields.changed,
         fields.grid.resolution,
         scores,
         counts,
         classes,
     )
     return scores, counts, classes
+
+
+@part
+def _meets(
+    cells: NDArray[np.bool_],
+    start: tuple[float, float],
+    direction: tuple[float, float],
+    lengths: tuple[float, float],
+) -> bool:
+    """Tell whether a cell is true at one of two lengths (cells) along a beam."""
+    height, width = cells.shape
+    for length in lengths:
+        column = math.floor(start[0] + length * direction[0])
+        row = math.floor(start[1] + length * direction[1])
+        if 0 <= column < width and 0 <= row < height and cells[row, column]:
+            return True
+    return False
 
 
 @part
@@ -252,6 +276,7 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
     squares: NDArray[np.uint16],
     distances_m: NDArray[np.float32],
     unknown: NDArray[np.bool_],
+    changed: NDArray[np.bool_],
     resolution: float,
     scores: NDArray[np.float64],
     counts: NDArray[np.int64],
@@ -295,20 +320,24 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
             if through:
                 differs += _THROUGH_COST
             if not hit[i]:
-                cost += weights[i] * differs
                 classes[k, i] = _THROUGH if through else _EXPLAINED
-                counts[k, classes[k, i]] += 1
-                continue
-            distance = distances_m[squares[y, x]] if inside else _FAR_M
-            near = math.exp(-0.5 * (distance / _SIGMA_M) ** 2)
-            cost += weights[i] * (differs - math.log(_INLIER * near + _OUTLIER))
-            if through:
-                classes[k, i] = _THROUGH
-            elif distance <= _EXPLAINED_M:
-                classes[k, i] = _EXPLAINED
-            elif not inside or unknown[y, x]:
-                classes[k, i] = _UNKNOWN
             else:
-                classes[k, i] = _SHORT
+                distance = distances_m[squares[y, x]] if inside else _FAR_M
+                near = math.exp(-0.5 * (distance / _SIGMA_M) ** 2)
+                differs -= math.log(_INLIER * near + _OUTLIER)
+                if through:
+                    classes[k, i] = _THROUGH
+                elif distance <= _EXPLAINED_M:
+                    classes[k, i] = _EXPLAINED
+                elif not inside or unknown[y, x]:
+                    classes[k, i] = _UNKNOWN
+                else:
+                    classes[k, i] = _SHORT
+            if changed.size > 0 and differs > _CHANGED_COST:
+                wall = expected if expected < reach else ranges[i]
+                lengths = (ranges[i] / resolution, wall / resolution + _IN_WALL_CELLS)
+                if _meets(changed, (start_x, start_y), (dx, dy), lengths):
+                    differs, classes[k, i] = _CHANGED_COST, _UNKNOWN
+            cost += weights[i] * differs
             counts[k, classes[k, i]] += 1
         scores[k] = cost

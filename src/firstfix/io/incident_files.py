@@ -31,6 +31,7 @@ _TYPES = {
     "start_arrays": "u1",
     "cells": "i1",
     "unseen": "b1",
+    "changed": "b1",
 }
 _NAME = re.compile(r"incident-(\d{8}T\d{9}Z)-([a-z-]{1,40})\.npz")
 _TIME = "%Y%m%dT%H%M%S"

@@ -64,8 +64,9 @@ def to_document(incident: Incident) -> tuple[dict[str, Any], dict[str, NDArray[A
     }
     if grid.cells.size <= MOST_CELLS:
         arrays["cells"] = grid.cells
-        if grid.unseen is not None:
-            arrays["unseen"] = grid.unseen
+        for name in ("unseen", "changed"):
+            if (mask := getattr(grid, name)) is not None:
+                arrays[name] = mask
     return document, arrays
 
 
@@ -178,6 +179,7 @@ def _read_map(
             float(described["resolution"]),
             decoder.decode(described["T_map_grid"], SE2),
             arrays.get("unseen"),
+            arrays.get("changed"),
         )
     if grid is None:
         raise InputError("The map is too large to be in the file. Pass its YAML with --map.")

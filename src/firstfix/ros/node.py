@@ -19,6 +19,7 @@ from firstfix.core.scan import LaserScan
 from firstfix.fields.cache import cache_folder
 from firstfix.global_localization.prior import Prior
 from firstfix.io.incident_files import IncidentFolder, incident_folder
+from firstfix.io.maps.map_server import load_map
 from firstfix.io.maps.zones import load_zones
 from firstfix.io.ros_messages.outgoing import occupancy_grid
 from firstfix.localizer.inputs import Input, NewMap, Reset
@@ -82,6 +83,7 @@ class Node:
         self._site: Site | None = None
         self._map_server: MapServerClient | None = None
         self._localizer = self._new_localizer()
+        self._changes: OccupancyGrid | None = None
         self._prior: Prior | None = None  # of the first search
         self._map: NewMap | None = None  # of yaml_filename, then the one in use
         self._logged_at: dict[str, float] = {}
@@ -221,8 +223,12 @@ class Node:
                 partial(self._transport.load_map, service),
                 lambda text: self.warn_throttled(service, text),
             )
+        if self._config.changes_layer:
+            self._changes = load_map(self._config.changes_layer)
         if self._config.yaml_filename:
             self._map = map_from(Path(self._config.yaml_filename))
+            if self._changes is not None:
+                self._map.grid.with_changes(self._changes)  # refused now, not in the worker
             self._prior = self._prior_of_zones(self._map.grid)
 
     def _prior_of_zones(self, grid: OccupancyGrid) -> Prior | None:
@@ -284,6 +290,8 @@ class Node:
                 self._handle(hint)
 
     def _handle(self, given: Input) -> None:
+        if isinstance(given, NewMap) and self._changes is not None:
+            given = self._with_changes(given, self._changes)
         try:
             outputs = self._localizer.handle(given)
         except MapError:
@@ -298,6 +306,14 @@ class Node:
             self._map = given
             self._publisher.publish_map_id(given.map_id)
         self._publish(given, outputs)
+
+    def _with_changes(self, given: NewMap, layer: OccupancyGrid) -> NewMap:
+        """Mark what is known to have changed; a map of other cells is used as it is."""
+        try:
+            return replace(given, grid=given.grid.with_changes(layer))
+        except MapError as error:
+            self.warn_throttled("changes_layer", f"changes_layer is not used. {error}")
+            return given
 
     def _new_localizer(self) -> AnyLocalizer:
         if self._site is None:

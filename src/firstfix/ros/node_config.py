@@ -86,6 +86,11 @@ class NodeConfig:
     )
     map_topic: str = setting("map", "topic of the map")
     first_map_only: bool = setting(False, "ignore maps after the first")
+    changes_layer: str = setting(
+        "",
+        "what is known to have changed in the map: changes.yaml, as 'firstfix map changes --out' "
+        "writes it; beams at these cells contradict a pose less; empty: nothing",
+    )
 
     zones: str = setting(
         "",
@@ -142,6 +147,10 @@ class NodeConfig:
             raise InputError(
                 "load_map_service is for the maps of a site, but site is empty. Set it, or leave "
                 "load_map_service empty."
+            )
+        if self.site and self.changes_layer:
+            raise InputError(
+                "changes_layer is of one map, but a site has many. Leave one of them empty."
             )
         if self.zones and not self.yaml_filename:
             raise InputError(
