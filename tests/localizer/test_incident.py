@@ -61,7 +61,9 @@ def through_json(incident: Incident) -> tuple[dict, dict]:
 
 def assert_identical(incident: Incident, cache: Path) -> None:
     saved = from_document(*through_json(incident))
-    steps = list(repeat(saved.incident, localizer_at_start(saved.incident, cache)))
+    steps = list(
+        repeat(saved.incident, localizer_at_start(saved.incident, saved.incident.map, cache))
+    )
     assert len(steps) == len(incident.inputs)
     assert [step.is_identical for step in steps] == [True] * len(steps)
     assert saved.other_software == ""
@@ -119,7 +121,9 @@ def test_a_flipped_bit_in_an_output_is_noticed(recorded, maps_cache):
     arrays = dict(arrays, arrays=arrays["arrays"].copy())
     arrays["arrays"][-1] ^= 1  # of the last covariance
     saved = from_document(document, arrays)
-    steps = repeat(saved.incident, localizer_at_start(saved.incident, maps_cache))
+    steps = repeat(
+        saved.incident, localizer_at_start(saved.incident, saved.incident.map, maps_cache)
+    )
     assert not all(step.is_identical for step in steps)
 
 
@@ -202,7 +206,12 @@ def test_hostile_documents_end_in_one_sentence(recorded, maps_cache):
         try:
             saved = from_document(copy, arrays)
             if saved.incident.config == recorded.robot.localizer.config:
-                list(repeat(saved.incident, localizer_at_start(saved.incident, maps_cache)))
+                list(
+                    repeat(
+                        saved.incident,
+                        localizer_at_start(saved.incident, saved.incident.map, maps_cache),
+                    )
+                )
         except InputError as error:
             said.append(str(error))
     assert len(said) > 75

@@ -11,10 +11,12 @@ import typer
 
 from firstfix.cli.progress import progress
 from firstfix.cli.serve import INTERRUPTED, PORT, Address, announce
+from firstfix.cli.site import load_site
 
 if TYPE_CHECKING:
     from firstfix.localizer.incident import Incident
     from firstfix.localizer.incident_document import Repeated, SavedIncident
+    from firstfix.site.site import Site
 
 OTHER_OUTPUTS = 1
 _MOST_LINES = 40
@@ -29,6 +31,10 @@ def replay(
         typer.Option(
             "--map", metavar="MAP", help="YAML of the map, where the file does not include it."
         ),
+    ] = None,
+    site_path: Annotated[
+        Path | None,
+        typer.Option("--site", metavar="SITE", help="The maps, if the robot was in a site."),
     ] = None,
     check: Annotated[
         bool,
@@ -53,15 +59,17 @@ def replay(
     from firstfix.fields.cache import cache_folder
     from firstfix.io.incident_files import load_incident
     from firstfix.io.maps.map_server import load_map
-    from firstfix.localizer.incident_document import from_document, localizer_at_start, repeat
+    from firstfix.localizer.incident_document import from_document, repeat
+    from firstfix.site.checkpoint import any_localizer_at_start
 
     document, arrays = load_incident(file)
     saved = from_document(document, arrays, load_map(map_path) if map_path else None)
     incident = saved.incident
+    site = None if site_path is None else load_site(site_path)
     if serve:
-        _serve(incident, file.stem, port)
+        _serve(incident, file.stem, port, site)
         return
-    localizer = localizer_at_start(incident, cache_folder())
+    localizer = any_localizer_at_start(incident, site, cache_folder())
     repeated = []
     with progress(len(incident.inputs), "repeating") as done:
         for step in repeat(incident, localizer):
@@ -76,14 +84,14 @@ def replay(
         raise typer.Exit(OTHER_OUTPUTS)
 
 
-def _serve(incident: Incident, name: str, port: int) -> None:
+def _serve(incident: Incident, name: str, port: int, site: Site | None) -> None:
     """Serve the page of an incident until it is interrupted."""
     from firstfix.lab.live.replayed_incident import ReplayedIncident
     from firstfix.web.server import listen, make_server
 
     access = Address("127.0.0.1", port, may_steer=False).access()
     with listen("127.0.0.1", port) as listening:
-        replayed = ReplayedIncident(incident, name, access)
+        replayed = ReplayedIncident(incident, name, access, site)
         announce(listening, access)
         with suppress(KeyboardInterrupt):  # the usual end
             make_server(replayed.page).run(sockets=[listening])
@@ -93,7 +101,7 @@ def _serve(incident: Incident, name: str, port: int) -> None:
 
 def _summary(saved: SavedIncident, repeated: list[Repeated]) -> dict[str, Any]:
     """Return what happened, for people and programs."""
-    from firstfix.localizer.outputs import InitialPose, Status, TrackedPose
+    from firstfix.localizer.outputs import InitialPose, MapSwitched, Status, TrackedPose
 
     incident, changes = saved.incident, []
     state, tracked = None, None
@@ -101,6 +109,8 @@ def _summary(saved: SavedIncident, repeated: list[Repeated]) -> dict[str, Any]:
         for output in step.outputs:
             if isinstance(output, TrackedPose):
                 tracked = output
+            elif isinstance(output, MapSwitched):
+                changes.append({"stamp": output.stamp, "map_id": output.map_id})
             elif isinstance(output, InitialPose):
                 pose = [round(float(number), 3) for number in output.T_map_base]
                 changes.append({"stamp": output.stamp, "found_at": pose})
@@ -134,7 +144,9 @@ def _print(summary: dict[str, Any], other_software: str) -> None:
     if hidden > 0:
         typer.echo(f"({hidden} earlier changes: --json shows them)")
     for change in summary["changes"][-_MOST_LINES:]:
-        if "state" in change:
+        if "map_id" in change:
+            typer.echo(f"{change['stamp']:14.3f}  map            {change['map_id']}")
+        elif "state" in change:
             typer.echo(f"{change['stamp']:14.3f}  {change['state']:14}  {change['reason']}")
         else:
             x, y, yaw = change["found_at"]

@@ -98,25 +98,25 @@ def known_parts(localizer: Localizer) -> dict[str, object]:
     return {"fields": matcher.fields, "belief_config": localizer.config.belief}
 
 
-def write_state(localizer: Localizer, encoder: Encoder) -> dict[str, Any]:
+def write_state(part: Localizer | ScanQueue, encoder: Encoder) -> dict[str, Any]:
     """Return the state as plain values; arrays go to the encoder.
 
     Parameters
     ----------
-    localizer : Localizer
-        With a map. It does not change.
+    part : Localizer or ScanQueue
+        A localizer with a map, or a queue of its own. It does not change.
     encoder : Encoder
         Made with `known_parts`.
     """
-    return _write(localizer, encoder)
+    return _write(part, encoder)
 
 
-def read_state(localizer: Localizer, state: object, decoder: Decoder) -> None:
-    """Give a localizer the state of another one.
+def read_state(part: Localizer | ScanQueue, state: object, decoder: Decoder) -> None:
+    """Give a localizer, or a queue, the state of another one.
 
     Parameters
     ----------
-    localizer : Localizer
+    part : Localizer or ScanQueue
         With the same settings and the same map as that of `write_state`.
     state : object
         Of `write_state`.
@@ -128,7 +128,7 @@ def read_state(localizer: Localizer, state: object, decoder: Decoder) -> None:
     InputError
         If the state is damaged; discard the localizer then.
     """
-    _read(localizer, state, decoder)
+    _read(part, state, decoder)
 
 
 def _write(part: object, encoder: Encoder) -> dict[str, Any]:

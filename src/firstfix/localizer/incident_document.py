@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from firstfix.core.se2 import SE2
 from firstfix.io.saved_pose import map_key
 from firstfix.localizer.checkpoint import known_parts, read_state
 from firstfix.localizer.config import LocalizerConfig
-from firstfix.localizer.incident import Cause, Incident, WrittenState
+from firstfix.localizer.incident import Cause, Incident, KeptOutput, WrittenState, kept
 from firstfix.localizer.inputs import Input, NewMap
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Output
@@ -30,14 +30,13 @@ MOST_CELLS = 4_000_000
 _MOST_TEXT = 2000
 
 _Inputs = tuple[Input, ...]
-_Outputs = tuple[tuple[Output, ...], ...]
+_Outputs = tuple[tuple[KeptOutput, ...], ...]
 Arrays = Mapping[str, NDArray[Any]]
 
 
 def to_document(incident: Incident) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     """Return a document for JSON and arrays of numbers, for `write_incident`."""
     encoder = Encoder()
-    grid = incident.map.grid
     document = {
         "format": FORMAT,
         "software": software(),
@@ -45,13 +44,7 @@ def to_document(incident: Incident) -> tuple[dict[str, Any], dict[str, NDArray[A
         "reason": incident.reason[:_MOST_TEXT],
         "stamp": float(incident.stamp),
         "config": encoder.encode(incident.config),
-        "map": {
-            "key": map_key(grid),
-            "id": incident.map.map_id,
-            "stamp": float(incident.map.stamp),
-            "resolution": grid.resolution,
-            "T_map_grid": encoder.encode(grid.T_map_grid),
-        },
+        "map": None if incident.map is None else _described(incident.map, encoder),
         "inputs": encoder.encode(incident.inputs),
         "outputs": encoder.encode(incident.outputs),
         "nodes": encoder.nodes,
@@ -62,12 +55,23 @@ def to_document(incident: Incident) -> tuple[dict[str, Any], dict[str, NDArray[A
         "arrays": np.frombuffer(bytes(encoder.arrays), np.uint8),
         "start_arrays": np.frombuffer(incident.start.arrays, np.uint8),
     }
-    if grid.cells.size <= MOST_CELLS:
+    grid = None if incident.map is None else incident.map.grid
+    if grid is not None and grid.cells.size <= MOST_CELLS:
         arrays["cells"] = grid.cells
         for name in ("unseen", "changed"):
             if (mask := getattr(grid, name)) is not None:
                 arrays[name] = mask
     return document, arrays
+
+
+def _described(given: NewMap, encoder: Encoder) -> dict[str, Any]:
+    return {
+        "key": map_key(given.grid),
+        "id": given.map_id,
+        "stamp": float(given.stamp),
+        "resolution": given.grid.resolution,
+        "T_map_grid": encoder.encode(given.grid.T_map_grid),
+    }
 
 
 def software() -> dict[str, str]:
@@ -150,7 +154,9 @@ def _read(document: Mapping[str, Any], arrays: Arrays, grid: OccupancyGrid | Non
     decoder = Decoder(document["nodes"], arrays["arrays"].tobytes())
     inputs = decoder.decode(document["inputs"], _Inputs)
     outputs = decoder.decode(document["outputs"], _Outputs)
-    texts = (document["reason"], document["map"]["id"], document["map"]["key"])
+    described = document["map"]
+    texts = [document["reason"]]
+    texts += [] if described is None else [described["id"], described["key"]]
     if len(inputs) != len(outputs) or not all(isinstance(text, str) for text in texts):
         raise InputError("The incident is damaged. Copy the file again.")
     versions = {str(name)[:100]: str(text)[:100] for name, text in document["software"].items()}
@@ -159,7 +165,7 @@ def _read(document: Mapping[str, Any], arrays: Arrays, grid: OccupancyGrid | Non
         reason=document["reason"][:_MOST_TEXT],
         stamp=float(document["stamp"]),
         config=decoder.decode(document["config"], LocalizerConfig),
-        map=_read_map(document["map"], arrays, grid, decoder),
+        map=None if described is None else _read_map(described, arrays, grid, decoder),
         start=WrittenState(
             document["start"], document["start_nodes"], arrays["start_arrays"].tobytes()
         ),
@@ -210,8 +216,19 @@ class Repeated:
     is_identical: bool
 
 
-def localizer_at_start(incident: Incident, cache_dir: Path | None = None) -> Localizer:
-    """Return a localizer in the state in which the incident begins.
+def localizer_at_start(
+    incident: Incident, in_map: NewMap, cache_dir: Path | None = None
+) -> Localizer:
+    """Return a localizer in the state in which an incident in one map begins.
+
+    Parameters
+    ----------
+    incident : Incident
+        The incident.
+    in_map : NewMap
+        Its map.
+    cache_dir : Path, optional
+        Folder of prepared maps.
 
     Raises
     ------
@@ -221,7 +238,7 @@ def localizer_at_start(incident: Incident, cache_dir: Path | None = None) -> Loc
         If the map cannot be searched.
     """
     localizer = Localizer(incident.config, cache_dir)
-    localizer.handle(incident.map)
+    localizer.handle(in_map)
     start, known = incident.start, known_parts(localizer)
     try:
         read_state(localizer, start.value, Decoder(start.nodes, start.arrays, known))
@@ -234,15 +251,22 @@ def localizer_at_start(incident: Incident, cache_dir: Path | None = None) -> Loc
     return localizer
 
 
-def repeat(incident: Incident, localizer: Localizer) -> Iterator[Repeated]:
+class Handles(Protocol):
+    """A localizer of one map or of many."""
+
+    def handle(self, given: Input) -> list[Output]:
+        """Process one input."""
+
+
+def repeat(incident: Incident, localizer: Handles) -> Iterator[Repeated]:
     """Handle the inputs of an incident again.
 
     Parameters
     ----------
     incident : Incident
         The incident.
-    localizer : Localizer
-        From `localizer_at_start`.
+    localizer : Localizer or SiteLocalizer
+        In the state in which the incident begins.
 
     Yields
     ------
@@ -265,12 +289,12 @@ def repeat(incident: Incident, localizer: Localizer) -> Iterator[Repeated]:
         yield Repeated(given, outputs, are_identical(recorded, outputs))
 
 
-def are_identical(recorded: tuple[Output, ...], outputs: list[Output]) -> bool:
+def are_identical(recorded: tuple[KeptOutput, ...], outputs: list[Output]) -> bool:
     """Return whether outputs are equal to the last bit."""
-    return _bits(recorded) == _bits(tuple(outputs))
+    return _bits(recorded) == _bits(kept(outputs))
 
 
-def _bits(outputs: tuple[Output, ...]) -> tuple[str, bytes]:
+def _bits(outputs: tuple[KeptOutput, ...]) -> tuple[str, bytes]:
     encoder = Encoder()
     value = encoder.encode(outputs)
     return repr((value, encoder.nodes)), bytes(encoder.arrays)

@@ -183,4 +183,20 @@ class MapSwitched:
     grid: OccupancyGrid = field(repr=False)
 
 
+@dataclass(frozen=True, slots=True)
+class NamedMap:
+    """A `MapSwitched` as incidents keep it: without the map.
+
+    Parameters
+    ----------
+    stamp : float
+        Time, s.
+    map_id : str
+        The name of the map.
+    """
+
+    stamp: float
+    map_id: str
+
+
 Output = MapSwitched | InitialPose | TrackedPose | Hypotheses | MotionRequest | Status

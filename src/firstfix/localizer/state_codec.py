@@ -38,7 +38,14 @@ from firstfix.global_localization.prior import Prior
 from firstfix.localizer import hint, pose_monitor
 from firstfix.localizer.config import ChangesConfig, LocalizerConfig, MonitorConfig, ScansConfig
 from firstfix.localizer.inputs import MapHint, NoMotionUpdate, PoseHint, PositionFix, Reset
-from firstfix.localizer.outputs import Hypotheses, InitialPose, MotionRequest, Status, TrackedPose
+from firstfix.localizer.outputs import (
+    Hypotheses,
+    InitialPose,
+    MotionRequest,
+    NamedMap,
+    Status,
+    TrackedPose,
+)
 from firstfix.localizer.pose_tracker import Tracked
 from firstfix.localizer.sensor_clocks import Clock
 from firstfix.localizer.states import State
@@ -60,7 +67,7 @@ _CLASSES: dict[str, type[Any]] = {
     for each in (
         *(SE2, LaserScan, Odometry, Signal, PoseHint, PositionFix, Reset, NoMotionUpdate, MapHint),
         *(Near, Gaussian, Region, AnyOf, All),
-        *(InitialPose, TrackedPose, Hypotheses, MotionRequest, Status),
+        *(InitialPose, TrackedPose, Hypotheses, MotionRequest, Status, NamedMap),
         *(Evidence, Hypothesis, SearchReport),
         *(LocalizerConfig, LocateConfig, AmclConfig, MonitorConfig, BeliefConfig, ScansConfig),
         *(ChangesConfig, View, Observation, Tracks, Belief, judge.Favourite),

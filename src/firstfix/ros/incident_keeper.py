@@ -12,6 +12,8 @@ from firstfix.localizer.incident import Cause, Incident, IncidentRecorder
 from firstfix.localizer.incident_document import to_document
 from firstfix.localizer.inputs import Input
 from firstfix.localizer.outputs import Output, Status
+from firstfix.site.checkpoint import written_state
+from firstfix.site.floors import AnyLocalizer, SiteLocalizer
 
 
 class IncidentKeeper:
@@ -32,13 +34,13 @@ class IncidentKeeper:
     def __init__(self, seconds: float, folder: IncidentFolder, warn: Callable[[str], None]) -> None:
         self.folder = folder
         self._seconds = seconds
-        self._recorder = IncidentRecorder(seconds) if seconds > 0.0 else None
+        self._recorder = IncidentRecorder(seconds, written_state) if seconds > 0.0 else None
         self._warn = warn
         self._saved_at: dict[Cause, float] = {}
         self._disk = ThreadPoolExecutor(1, "firstfix-incidents")
         self._writing: Future[str] | None = None
 
-    def __call__(self, given: Input, outputs: list[Output], localizer: object) -> None:
+    def __call__(self, given: Input, outputs: list[Output], localizer: AnyLocalizer) -> None:
         """Keep an input with its outputs; save an incident if one has happened."""
         if self._recorder is None:
             return
@@ -46,6 +48,8 @@ class IncidentKeeper:
         cause = self._recorder.observe(given, outputs, localizer)
         if cause is None or not self._is_due(cause, given.stamp):
             return
+        if isinstance(localizer, SiteLocalizer) and localizer.is_riding:
+            return  # in a lift a pose is withheld, not revoked
         reasons = [output.reason for output in outputs if isinstance(output, Status)]
         incident = self._recorder.take(cause, reasons[-1] if reasons else cause.value)
         if incident is not None:
@@ -64,7 +68,7 @@ class IncidentKeeper:
             raise InputError("Nothing is kept: incident_seconds is 0. Set it to 30, for instance.")
         incident = self._recorder.take(Cause.REQUESTED, reason)
         if incident is None:
-            raise InputError("Nothing is kept before the first map, nor in a site of several maps.")
+            raise InputError("Nothing is kept before the first map.")
         return self._write(incident)
 
     def close(self) -> None:

@@ -344,8 +344,7 @@ class Node:
         self._tell(given, outputs)
 
     def _tell(self, given: Input, outputs: list[Output]) -> None:
-        if isinstance(self._localizer, Localizer):  # an incident has one map
-            self.incidents(given, outputs, self._localizer)
+        self.incidents(given, outputs, self._localizer)
         for watch in self._watchers:
             watch(given, outputs, self._localizer)
 

@@ -58,13 +58,18 @@ class MapLocalizers:
         Settings of each localizer.
     cache_dir : Path or None
         Folder of prepared maps.
+
+    Attributes
+    ----------
+    held : dict of str to Localizer
+        Those of the maps that were used last, by map.
     """
 
     def __init__(self, site: Site, config: LocalizerConfig, cache_dir: Path | None) -> None:
         self._site = site
         self._config = config
         self._cache_dir = cache_dir
-        self._held: OrderedDict[str, Localizer] = OrderedDict()
+        self.held: OrderedDict[str, Localizer] = OrderedDict()
 
     def propose(self, map_id: str, T_map_base: SE2, view: View, source: str) -> Candidate:
         """Let the localizer of a map verify a place.
@@ -87,15 +92,20 @@ class MapLocalizers:
         )
         return Candidate(map_id, localizer, view.T_odom_base @ T_map_base.inverse())
 
+    def new_localizer(self, map_id: str, stamp: float) -> Localizer:
+        """Make a localizer that knows nothing but its map."""
+        made = Localizer(self._config, self._cache_dir)
+        fields = self._site.fields(map_id)
+        made.handle(NewMap(stamp, fields.grid, map_id, fields))
+        return made
+
     def _localizer(self, map_id: str, stamp: float) -> Localizer:
-        held = self._held.pop(map_id, None)
+        held = self.held.pop(map_id, None)
         if held is None or held.state is State.LIFTED:
-            held = Localizer(self._config, self._cache_dir)
-            fields = self._site.fields(map_id)
-            held.handle(NewMap(stamp, fields.grid, map_id, fields))
-        self._held[map_id] = held
-        while len(self._held) > _MOST:
-            self._held.popitem(last=False)
+            held = self.new_localizer(map_id, stamp)
+        self.held[map_id] = held
+        while len(self.held) > _MOST:
+            self.held.popitem(last=False)
         return held
 
 

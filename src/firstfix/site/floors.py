@@ -43,7 +43,9 @@ _GAP_S = 1.0
 _JUMP_M = 1.0
 
 
-class _Phase(Enum):
+class Phase(Enum):
+    """What is open: the map, the floor of a lift, or nothing."""
+
     SEARCHING = "any place of any map"
     RIDING = "in a lift, or just out of it: one place of each of its floors"
     TRACKING = "one place"
@@ -84,7 +86,7 @@ class SiteLocalizer:
         self.config = config or LocalizerConfig()
         self._localizers = MapLocalizers(site, self.config, cache_dir)
         self._scans = ScanQueue(self.config.scans)
-        self._phase = _Phase.SEARCHING
+        self._phase = Phase.SEARCHING
         self._search = self._new_search(None)
         self._lifted: set[SignalKind] = set()
         self._localizer: Localizer | None = None  # of the map in use
@@ -99,7 +101,7 @@ class SiteLocalizer:
     @property
     def state(self) -> State:
         """The state, as that of a `Localizer`."""
-        if self._phase is _Phase.TRACKING and self._localizer is not None:
+        if self._phase is Phase.TRACKING and self._localizer is not None:
             return self._localizer.state
         return State.LIFTED if self._lifted else self._state
 
@@ -107,6 +109,12 @@ class SiteLocalizer:
     def map_id(self) -> str | None:
         """The map in use: the last that was named; None before the first."""
         return self._map_id
+
+    @property
+    def is_riding(self) -> bool:
+        """True in a lift that may move, and until it is sure on which floor the robot came out."""
+        ride = self._ride if self._phase is Phase.RIDING else None
+        return ride is not None and ride.probation is None
 
     @property
     def particles(self) -> Particles | None:
@@ -181,13 +189,13 @@ class SiteLocalizer:
 
     @property
     def _tracking(self) -> Localizer | None:
-        return self._localizer if self._phase is _Phase.TRACKING else None
+        return self._localizer if self._phase is Phase.TRACKING else None
 
     def _take_odometry(self, given: Odometry) -> list[Output]:
         has_jumped = self._scans.add_odometry(given)
-        if has_jumped and self._phase is _Phase.RIDING:
+        if has_jumped and self._phase is Phase.RIDING:
             return self._start_search(given.stamp, "odometry jumped in a lift: searching all maps")
-        if has_jumped and self._phase is _Phase.SEARCHING:
+        if has_jumped and self._phase is Phase.SEARCHING:
             self._search = self._new_search(None)
             self._hinted = None
         if self._tracking is None:
@@ -210,7 +218,7 @@ class SiteLocalizer:
         if named not in self.site.map_ids:
             reason = f"{source} names the map {named!r:.60}, which cannot be used in this site"
             return [self._status(given.stamp, reason)]
-        if self._phase is _Phase.TRACKING and named == self._map_id:
+        if self._phase is Phase.TRACKING and named == self._map_id:
             return [self._status(given.stamp, f"{source} names the map in use")]
         if self._ride is not None and self._ride.lift.leads_to(named):
             self._begin_ride(Ride(self.site, self._ride.lift, named))
@@ -231,9 +239,9 @@ class SiteLocalizer:
             return []
         was_blind = self._view_at is not None and view.stamp - self._view_at > _GAP_S
         self._view_at = view.stamp
-        if self._phase is _Phase.SEARCHING:
+        if self._phase is Phase.SEARCHING:
             return self._find(view)
-        if self._phase is _Phase.RIDING:
+        if self._phase is Phase.RIDING:
             return self._weigh_floors(view, self._ride)
         return self._follow(view, was_blind=was_blind)
 
@@ -264,7 +272,7 @@ class SiteLocalizer:
         return [self._status(view.stamp, result.reason)]
 
     def _begin_ride(self, ride: Ride) -> Ride:
-        self._phase, self._ride, self._candidate = _Phase.RIDING, ride, None
+        self._phase, self._ride, self._candidate = Phase.RIDING, ride, None
         return ride
 
     def _weigh_floors(self, view: View, ride: Ride | None) -> list[Output]:
@@ -295,9 +303,9 @@ class SiteLocalizer:
         return [self._open(view.stamp, f"probably in {candidate.map_id}: {reason}")]
 
     def _switch(self, view: View, candidate: Candidate, outputs: list[Output]) -> list[Output]:
-        if self._phase is _Phase.RIDING and self._ride is not None:
+        if self._phase is Phase.RIDING and self._ride is not None:
             self._ride.end_at(candidate.map_id)
-        self._phase, self._localizer = _Phase.TRACKING, candidate.localizer
+        self._phase, self._localizer = Phase.TRACKING, candidate.localizer
         self._candidate = self._hinted = None
         self._note_pose(outputs)
         if candidate.map_id == self._map_id:
@@ -319,7 +327,7 @@ class SiteLocalizer:
         if ride is not None and not ride.is_still_likely(f"{self._map_id}", view):
             self._begin_ride(ride)
             return [self._open(view.stamp, "another floor fits better now")]
-        if ride is not None and ride.is_over and lift is None:
+        if ride is not None and ride.belief is None and lift is None:
             self._ride = None
         outputs: list[Output] = []
         for scan in view.scans:
@@ -357,7 +365,7 @@ class SiteLocalizer:
     def _start_search(
         self, stamp: float, reason: str, prior: SitePrior | None = None
     ) -> list[Output]:
-        self._phase, self._state = _Phase.SEARCHING, State.SEARCHING
+        self._phase, self._state = Phase.SEARCHING, State.SEARCHING
         self._search = self._new_search(prior)
         self._ride = self._candidate = self._hinted = None
         return [self._status(stamp, reason)]

@@ -56,6 +56,11 @@ class PreparedMaps:
         Folder of prepared maps; None prepares in memory.
     memory_limit : int
         Size of the maps that are held, bytes. One map is always held.
+
+    Attributes
+    ----------
+    contents : dict of str to str
+        `PreparedMap.content` of each map that has been loaded, held or not.
     """
 
     def __init__(
@@ -67,6 +72,7 @@ class PreparedMaps:
         self._held: OrderedDict[str, PreparedMap] = OrderedDict()
         self._sizes: dict[str, int] = {}
         self._lock = Lock()
+        self.contents: dict[str, str] = {}
 
     def get(self, map_id: str) -> PreparedMap:
         """Return a map; it is mapped from its files, or prepared, if it is not held.
@@ -82,6 +88,7 @@ class PreparedMaps:
             if map_id not in self._maps:
                 raise InputError(f"There is no map {map_id!r:.60} in this site. Check map_ids.")
             held = prepared(self._maps[map_id], self._cache_dir)
+            self.contents[map_id] = held.content
         with self._lock:
             held = self._held.setdefault(map_id, held)
             self._held.move_to_end(map_id)

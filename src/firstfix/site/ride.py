@@ -48,19 +48,21 @@ class Ride:
         The lift, seen from the map in which the robot came in.
     hinted : str, optional
         The map that something other than the scans has named.
+
+    Attributes
+    ----------
+    belief : MapBelief or None
+        Which floor the views speak for; None before the first that sees out, and at the end.
+    probation : int or None
+        Views for which a chosen floor is still watched; None until one is chosen.
     """
 
     def __init__(self, site: Site, lift: Lift, hinted: str | None = None) -> None:
         self._site = site
         self.lift = lift
         self.hinted = hinted
-        self._belief: MapBelief | None = None
-        self._probation = 0  # views for which a chosen floor is still watched
-
-    @property
-    def is_over(self) -> bool:
-        """True once nothing watches the chosen floor any more."""
-        return self._belief is None
+        self.belief: MapBelief | None = None
+        self.probation: int | None = None
 
     def weigh(self, view: View, T_map_base: SE2) -> Weighed:
         """Weigh the floors by another view.
@@ -72,53 +74,53 @@ class Ride:
         T_map_base : SE2
             The robot at the view, by odometry, on the map of `lift`.
         """
-        if self._belief is not None:
-            best = self._belief.most_likely
+        if self.belief is not None:
+            best = self.belief.most_likely
             self.lift, T_map_base = (
                 self.lift.seen_from(best),
-                predicted(self._belief, best, view),
+                predicted(self.belief, best, view),
             )
         lift, name = self.lift, self.lift.transition.id
         if lift.holds(T_map_base) and not sees_out(view, lift, T_map_base):
-            self._belief = self.hinted = None
+            self.belief = self.hinted = None
             return Weighed(T_map_base, f"in {name}, which may move: waiting for its door to open")
-        self._belief = self._look(without_cabin(view, lift, T_map_base), T_map_base)
-        if self._belief is None:
+        self.belief = self._look(without_cabin(view, lift, T_map_base), T_map_base)
+        if self.belief is None:
             return Weighed(T_map_base, f"no floor of {name} can be compared")
-        if self._belief.is_refuted:
-            return self._refuted(T_map_base, self._belief)
-        chosen = self._belief.decided
+        if self.belief.is_refuted:
+            return self._refuted(T_map_base, self.belief)
+        chosen = self.belief.decided
         if chosen is None:
-            return Weighed(T_map_base, _in_words(self._belief))
-        pose = self._belief.floors[chosen].T_map_base
-        return Weighed(T_map_base, _in_words(self._belief), (chosen, pose))
+            return Weighed(T_map_base, _in_words(self.belief))
+        pose = self.belief.floors[chosen].T_map_base
+        return Weighed(T_map_base, _in_words(self.belief), (chosen, pose))
 
     def end_at(self, map_id: str) -> None:
         """Note that the robot is tracked on a floor now."""
         self.lift = self.lift.seen_from(map_id)
-        self._probation = _PROBATION_VIEWS if self.hinted is None else 0
+        self.probation = _PROBATION_VIEWS if self.hinted is None else 0
         self.hinted = None
 
     def is_still_likely(self, map_id: str, view: View) -> bool:
         """Weigh a floor that was chosen lately against the others once more."""
-        if self._belief is None or self._probation <= 0:
-            self._belief = None
+        if self.belief is None or not self.probation:
+            self.belief = None
             return True
-        if brings_news(self._belief, view):
-            self._probation -= 1
-            self._belief = look(self._belief, view)
-        return self._belief.probabilities[map_id] >= 0.5 or self._belief.misses > 0
+        if brings_news(self.belief, view):
+            self.probation -= 1
+            self.belief = look(self.belief, view)
+        return self.belief.probabilities[map_id] >= 0.5 or self.belief.misses > 0
 
     def _look(self, outside: View, T_map_base: SE2) -> MapBelief | None:
-        if self._belief is not None:
-            return look(self._belief, outside)
+        if self.belief is not None:
+            return look(self.belief, outside)
         places = _places(self._site, self.lift, T_map_base)
         unseen = len(self.lift.transition.ends) - len(places)
         return begin_maps(places, outside, unseen=unseen, hinted=self.hinted)
 
     def _refuted(self, T_map_base: SE2, belief: MapBelief) -> Weighed:
         """Wait, where the robot may be on a floor that has no map."""
-        self._belief = None
+        self.belief = None
         reason = f"the views fit no floor of {self.lift.transition.id}"
         if belief.unseen:
             return Weighed(T_map_base, f"{reason} whose map can be used")

@@ -132,6 +132,15 @@ class Site:
         """
         return self._maps.get(map_id).fields
 
+    @property
+    def contents(self) -> dict[str, str]:
+        """Hash of each map that can be used; copies have the same."""
+        known = self._maps.contents
+        for name in self.map_ids:
+            if name not in known:
+                self._is_usable(self._entries[name])
+        return dict(known)
+
     def content(self, map_id: str) -> str:
         """Return a hash of a map: copies have the same."""
         return self._maps.get(map_id).content

@@ -26,13 +26,18 @@ class SiteSearch:
         What is known of map and pose.
     rest_s : float
         Time between two questions while the robot rests, s.
+
+    Attributes
+    ----------
+    views : list of View
+        Those that are asked about together.
     """
 
     def __init__(self, site: Site, prior: SitePrior | None, rest_s: float) -> None:
         self._site = site
-        self._prior = prior
+        self.prior = prior
         self._rest_s = rest_s
-        self._views: list[View] = []
+        self.views: list[View] = []
 
     def ask(self, view: View) -> SiteResult | None:
         """Return the verdict over all maps with a further view; None if it is no news.
@@ -42,16 +47,16 @@ class SiteSearch:
         view : View
             The newest view.
         """
-        if self._views:
-            step = self._views[-1].T_odom_base.inverse() @ view.T_odom_base
+        if self.views:
+            step = self.views[-1].T_odom_base.inverse() @ view.T_odom_base
             metres, radians = math.hypot(step.x, step.y), abs(step.yaw)
             rests = metres < REST_M and radians < REST_RAD
-            waited = not 0.0 <= view.stamp - self._views[-1].stamp < self._rest_s
+            waited = not 0.0 <= view.stamp - self.views[-1].stamp < self._rest_s
             if metres < NEWS_M and radians < NEWS_RAD and not (rests and waited):
                 return None
             if rests:
-                self._views.pop()
-        self._views = [*self._views, view][-_VIEWS:]
-        scans = [replace(scan, stamp=v.stamp) for v in self._views for scan in v.scans]
-        odometry = [v.T_odom_base for v in self._views for _ in v.scans]
-        return self._site.locate(scans, odometry, prior=self._prior)
+                self.views.pop()
+        self.views = [*self.views, view][-_VIEWS:]
+        scans = [replace(scan, stamp=v.stamp) for v in self.views for scan in v.scans]
+        odometry = [v.T_odom_base for v in self.views for _ in v.scans]
+        return self._site.locate(scans, odometry, prior=self.prior)

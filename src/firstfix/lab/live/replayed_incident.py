@@ -8,8 +8,12 @@ from contextlib import suppress
 from firstfix.core.errors import InputError
 from firstfix.fields.cache import cache_folder
 from firstfix.localizer.incident import Incident
-from firstfix.localizer.incident_document import localizer_at_start, repeat
-from firstfix.localizer.inputs import Input
+from firstfix.localizer.incident_document import repeat
+from firstfix.localizer.inputs import Input, NewMap
+from firstfix.localizer.outputs import MapSwitched
+from firstfix.site.checkpoint import any_localizer_at_start
+from firstfix.site.floors import SiteLocalizer
+from firstfix.site.site import Site
 from firstfix.web.access_control import AccessPolicy
 from firstfix.web.command_executor import CommandExecutor
 from firstfix.web.page import Page
@@ -30,6 +34,8 @@ class ReplayedIncident:
         Name of the map on the page.
     access : AccessPolicy
         Who may see the page; nobody may steer.
+    site : Site, optional
+        The maps of an incident in a site.
 
     Raises
     ------
@@ -37,15 +43,21 @@ class ReplayedIncident:
         If the state in the incident is damaged.
     """
 
-    def __init__(self, incident: Incident, name: str, access: AccessPolicy) -> None:
+    def __init__(
+        self, incident: Incident, name: str, access: AccessPolicy, site: Site | None = None
+    ) -> None:
         self._incident = incident
-        self._localizer = localizer_at_start(incident, cache_folder())
-        self._store = SnapshotStore(name)
+        self._localizer = any_localizer_at_start(incident, site, cache_folder())
+        self._store = SnapshotStore(name if site is None else "")
         self._is_ended = threading.Event()
         self._thread = threading.Thread(target=self._play, name="replay", daemon=True)
         executor = CommandExecutor(self._store, _refuse)
         self.page = Page("replay", self._store, executor, access, on_first_viewer=self.start)
-        self._store(incident.map, [], self._localizer)
+        matcher, named = self._localizer.matcher, incident.map
+        if named is None and matcher is not None and isinstance(self._localizer, SiteLocalizer):
+            named = NewMap(incident.stamp, matcher.fields.grid, f"{self._localizer.map_id}")
+        if named is not None:
+            self._store(named, [], self._localizer)
 
     def start(self) -> None:
         """Play; a second call has no effect."""
@@ -68,6 +80,10 @@ class ReplayedIncident:
                 before = stamp
                 if self._is_ended.wait(max(0.0, pause)):
                     return
+                for output in step.outputs:
+                    if isinstance(output, MapSwitched):
+                        named = NewMap(output.stamp, output.grid, output.map_id)
+                        self._store(named, [], self._localizer)
                 self._store(step.given, step.outputs, self._localizer)
                 different += not step.is_identical
         except InputError as error:
