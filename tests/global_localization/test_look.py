@@ -15,7 +15,6 @@ from firstfix.global_localization.config import MAX_POSES, LocateConfig
 from firstfix.global_localization.look import (
     BEAMS,
     find_places,
-    limit_of,
     look_at,
     look_into,
 )
@@ -64,9 +63,20 @@ def slow_scores(beams, fields):
 @pytest.mark.parametrize("sensor", [{}, {"fov": 2.0, "beams": 100, "range_max": 5.0}])
 def test_the_kernel_is_the_slow_comparison(fields: MapFields, sensor) -> None:
     beams = usable_beams(scan_at(POSES[0], **sensor))
-    looked = look_at(beams, fields)
+    (looked,), _ = look_at(beams, [fields], 10**9)
     np.testing.assert_array_equal(looked.scores, np.minimum(slow_scores(beams, fields), 1023))
-    assert looked.histogram.sum() == looked.scores.size
+
+
+@pytest.mark.parametrize("kept", [1, 300, 3000])
+def test_what_is_dropped_early_would_not_have_been_kept(fields: MapFields, kept: int) -> None:
+    beams = usable_beams(scan_at(POSES[1]))
+    maps = [MapFields(house(), most_positions=0), fields]
+    whole, _ = look_at(beams, maps, 10**9)
+    looked, limit = look_at(beams, maps, kept)
+    for all_of_map, of_map in zip(whole, looked, strict=True):
+        kept_early = np.minimum(of_map.scores, limit + 1)
+        np.testing.assert_array_equal(kept_early, np.minimum(all_of_map.scores, limit + 1))
+    assert np.count_nonzero(looked[1].scores == 1023) > 0
 
 
 @pytest.mark.parametrize("pose", POSES)
@@ -108,9 +118,8 @@ def test_the_right_map_of_several_has_the_best_place(fields: MapFields) -> None:
 
 
 def test_the_limit_keeps_about_as_many_as_asked(fields: MapFields) -> None:
-    looked = look_at(usable_beams(scan_at(POSES[0])), fields)
     for kept in (1, 300, 3000, 10**9):
-        limit = limit_of([looked], kept)
+        (looked,), limit = look_at(usable_beams(scan_at(POSES[0])), [fields], kept)
         best = np.count_nonzero(looked.scores == looked.scores.min())
         assert 1 <= np.count_nonzero(looked.scores <= limit) <= max(kept, best)
 

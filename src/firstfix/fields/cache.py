@@ -115,6 +115,8 @@ def _load(path: Path) -> NDArray[Any] | None:
         with path.open("rb") as file:
             content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         array = _array_in(content)
+        if hasattr(mmap, "MADV_DONTNEED"):  # the check has read all of it: keep what is used
+            content.madvise(mmap.MADV_DONTNEED)
     except Exception:  # noqa: BLE001 - a damaged file raises nearly anything
         return None
     with contextlib.suppress(OSError):

@@ -58,6 +58,12 @@ _BOUNDS_WEIGHT = 0.5
 # Scores of the bounds are below this.
 _LEVELS = 1024
 
+# Beams, of at most 10 each, after which it is seen whether an entry can still be good.
+_TOGETHER = 16
+
+# Entries between which the limit is drawn closer.
+_PART = 4096
+
 _HEADINGS = DIRECTIONS // SECTORS  # of a sector
 _LOOK_HEADINGS = LOOK_DIRECTIONS // SECTORS
 
@@ -70,15 +76,12 @@ class LookedAt:
     ----------
     scores : ndarray of uint16, shape (n, SECTORS)
         Of each entry of `MapFields.look` the best heading in each eighth of a turn; lower is
-        better.
-    histogram : ndarray of int64, shape (levels,)
-        How often each score occurs.
+        better. Above the limit of `look_at` the largest score stands for any.
     beams : int
         Number of beams that were compared.
     """
 
     scores: NDArray[np.uint16]
-    histogram: NDArray[np.int64]
     beams: int
 
 
@@ -164,8 +167,7 @@ def look_into(beams: Beams, maps: Sequence[MapFields], shortlist: int) -> list[C
     list of Candidates
         For each map the best pose of each place, best first; none where other maps are better.
     """
-    looks = [look_at(beams, fields) for fields in maps]
-    limit = limit_of(looks, BLOCKS_KEPT)
+    looks, limit = look_at(beams, maps, BLOCKS_KEPT)
     found = [
         end_points(beams, fields, looked, limit) for fields, looked in zip(maps, looks, strict=True)
     ]
@@ -176,29 +178,56 @@ def look_into(beams: Beams, maps: Sequence[MapFields], shortlist: int) -> list[C
     ]
 
 
-def look_at(beams: Beams, fields: MapFields) -> LookedAt:
-    """Compare a scan with the bounds of all blocks of a map."""
-    query, table = _look_beams(beams), fields.look
-    scores = np.empty((len(table), SECTORS), np.uint16)
+def look_at(beams: Beams, maps: Sequence[MapFields], kept: int) -> tuple[list[LookedAt], int]:
+    """Compare a scan with the bounds of all blocks of several maps.
+
+    Most blocks are dropped after some of the beams: costs only grow, and ``kept`` blocks of the
+    maps before are better already. The result is the same as without that.
+
+    Parameters
+    ----------
+    beams : Beams
+        At least one from the origin, in the sensor frame.
+    maps : sequence of MapFields
+        The maps; at least one.
+    kept : int
+        Number of blocks and eighths of a turn that go on, about.
+
+    Returns
+    -------
+    looks : list of LookedAt
+        Of each map.
+    limit : int
+        Worst score of the blocks that go on.
+    """
+    query = _look_beams(beams)
     histogram = np.zeros(_LEVELS, np.int64)
-    weight = _SPREAD_WEIGHT * query.beams / 64.0
-    penalties = np.rint(weight * table.spreads).astype(np.uint16)
-    _look(
-        table.bounds,
-        query.directions,
-        query.counts,
-        query.through,
-        query.short,
-        penalties,
-        scores,
-        histogram,
-    )
-    return LookedAt(scores, histogram, query.beams)
+    looks = []
+    for fields in maps:
+        table = fields.look
+        scores = np.empty((len(table), SECTORS), np.uint16)
+        weight = _SPREAD_WEIGHT * query.beams / 64.0
+        penalties = np.rint(weight * table.spreads).astype(np.uint16)
+        for part in range(0, len(table), _PART):
+            here = slice(part, part + _PART)
+            _look(
+                table.bounds[here],
+                query.directions,
+                query.counts,
+                query.through,
+                query.short,
+                penalties[here],
+                limit_of(histogram, kept),
+                scores[here],
+                histogram,
+            )
+        looks.append(LookedAt(scores, query.beams))
+    return looks, limit_of(histogram, kept)
 
 
-def limit_of(looks: Sequence[LookedAt], kept: int) -> int:
-    """Return the worst score of the best blocks of several maps, about ``kept`` in number."""
-    total = np.cumsum(np.sum([look.histogram for look in looks], axis=0))
+def limit_of(histogram: NDArray[np.int64], kept: int) -> int:
+    """Return the worst score of the best blocks, about ``kept`` in number."""
+    total = np.cumsum(histogram)
     # At least one level, however many are equal.
     return max(int(np.argmax(total > 0)), int(np.searchsorted(total, kept, side="right")) - 1)
 
@@ -274,11 +303,13 @@ def _look_beams(beams: Beams) -> _LookBeams:
     order = np.lexsort((np.abs(exact - direction), direction % LOOK_DIRECTIONS))
     directions, first = np.unique(direction[order] % LOOK_DIRECTIONS, return_index=True)
     keep = np.linspace(0, len(directions) - 1, min(BEAMS, len(directions))).round().astype(np.int64)
-    seen = own.take(order[first[keep]])
+    # Long beams first: few blocks can see that far, and most are dropped after some beams.
+    keep = keep[np.argsort(-own.ranges[order[first[keep]]], kind="stable")]
+    seen, seen_in = own.take(order[first[keep]]), directions[keep]
     padding = -len(keep) % 4  # the kernel takes four at a time; padding costs nothing
     counts = np.minimum(np.rint(seen.ranges / range_table.UNIT_M), range_table.FARTHEST)
     return _LookBeams(
-        directions=np.pad(directions[keep], (0, padding)),
+        directions=np.pad(seen_in, (0, padding)),
         counts=np.pad(counts.astype(np.uint8), (0, padding)),
         through=np.pad(np.where(seen.hit, THROUGH_LIMIT, NO_RETURN_LIMIT), (0, padding)),
         short=np.pad(np.where(seen.hit, SHORT_LIMIT, np.uint8(0)), (0, padding)),
@@ -297,15 +328,20 @@ def _look(  # noqa: PLR0913 - a kernel takes its arrays one by one
     through: NDArray[np.uint8],
     short: NDArray[np.uint8],
     penalties: NDArray[np.uint16],
+    limit: int,
     scores: NDArray[np.uint16],
     histogram: NDArray[np.int64],
 ) -> None:
-    """Compare all headings of every entry: sums of bytes, as `search._add_ranges`."""
+    """Compare all headings of every entry: sums of bytes, as `search._add_ranges`.
+
+    An entry that is above the limit at every heading is dropped.
+    """
     # Written twice, so that every heading is one slice.
     low, high = np.empty(2 * LOOK_DIRECTIONS, np.uint8), np.empty(2 * LOOK_DIRECTIONS, np.uint8)
     narrow, wide = np.empty(LOOK_DIRECTIONS, np.uint8), np.empty(LOOK_DIRECTIONS, np.uint16)
     n = directions.shape[0]
     for k in range(bounds.shape[0]):
+        least = penalties[k]
         nearest, farthest = bounds[k, 0], bounds[k, 1]
         for h in range(LOOK_DIRECTIONS):
             low[h] = nearest[h]
@@ -314,10 +350,10 @@ def _look(  # noqa: PLR0913 - a kernel takes its arrays one by one
             high[h + LOOK_DIRECTIONS] = farthest[h]
             wide[h] = 0
         j = 0
-        while j < n:
+        while j < n and least <= limit:
             for h in range(LOOK_DIRECTIONS):
                 narrow[h] = 0
-            end = min(n, j + 24)  # of at most 10 each
+            end = min(n, j + _TOGETHER)
             while j < end:
                 a, b = low[directions[j] :], low[directions[j + 1] :]
                 c, d = low[directions[j + 2] :], low[directions[j + 3] :]
@@ -347,6 +383,14 @@ def _look(  # noqa: PLR0913 - a kernel takes its arrays one by one
                 j += 4
             for h in range(LOOK_DIRECTIONS):
                 wide[h] += np.uint16(narrow[h])
+            lowest = np.uint16(65535)
+            for h in range(LOOK_DIRECTIONS):
+                lowest = min(lowest, wide[h])
+            least = np.uint16(lowest + penalties[k])
+        if least > limit:
+            scores[k] = _LEVELS - 1
+            histogram[_LEVELS - 1] += SECTORS
+            continue
         for sector in range(SECTORS):
             best = np.uint16(65535)
             for h in range(_LOOK_HEADINGS):
