@@ -79,6 +79,16 @@ def test_a_wrong_prior_is_overruled(draw_room, found):
         assert result.probability_without_prior > 0.99
 
 
+def test_a_prior_is_a_second_witness_only_for_the_places_near_it(draw_room):
+    matcher, truth = ScanMatcher(draw_room(0.05)), SE2(2.0, 2.5, 0.6)
+    little = replace(LIDAR, fov=math.pi, range_max=8.0)  # one scan of it is never UNIQUE
+    scan = little.scan(matcher.fields.grid, truth, np.random.default_rng(1))
+    results = [matcher.locate(scan, prior=Near(p, 0.5)) for p in (truth, SE2(7.0, 5.5, -2.0))]
+    assert [result.verdict for result in results] == [Verdict.UNIQUE, Verdict.AMBIGUOUS]
+    assert all(result.best.pose.distance_to(truth) < 0.05 for result in results)
+    assert "one scan of a sensor" in results[1].reason
+
+
 def test_a_prior_multiplies_likelihoods():
     scores, logs = np.array([0.1, 0.5, 1.0, 2.0]), np.array([0.0, -0.5, -3.0, -6.9])
     for beams in (12, 30, 500):

@@ -86,6 +86,10 @@ class PlacePrior:
             return [scores]
         return [with_prior(scores, self._logs(verification.poses), self.beams), scores]
 
+    def speaks_for(self, pose: NDArray[np.float64]) -> bool:
+        """Return whether there is a prior, and a pose of shape (3,) is near it."""
+        return self.prior is not None and float(self._logs(pose[None])[0]) >= NEAR_LOG
+
     def _logs(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
         assert self.prior is not None  # noqa: S101 - by the callers
         return self.prior.log_likelihood(bases_in_map(self.grid, self.scan, poses))

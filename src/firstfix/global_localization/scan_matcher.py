@@ -284,8 +284,8 @@ def locate(
         for i, probability in zip(ranked, probabilities, strict=True)
     )
     verdict, reason = _judge(verification, ranked, probabilities, report, config)
-    # A prior is a second witness.
-    if verdict is Verdict.UNIQUE and prior is None and not see_enough(scans):
+    sure = see_enough(scans) or known.speaks_for(poses[ranked[0]])  # a prior is a second witness
+    if verdict is Verdict.UNIQUE and not sure:
         verdict, reason = Verdict.AMBIGUOUS, f"{reason}, {_SEES_TOO_LITTLE}"
     result = LocateResult(verdict, reason, hypotheses, report, 0.0, scans=tuple(scans))
     if prior is not None:

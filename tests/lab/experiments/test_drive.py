@@ -109,3 +109,18 @@ def test_clocks_that_never_meet_are_named(log: Recording) -> None:
 def test_without_a_start_there_must_be_truth(log: Recording, truth: np.ndarray | None) -> None:
     with pytest.raises(ScanError, match="firstfix locate"):
         plan_drive(replace(log, truth=truth), None)
+
+
+def test_scans_of_one_time_are_one_sight_seen_from_its_first_sensor(log: Recording) -> None:
+    assert log.odometry is not None
+    later = log.scans[0].stamp + 0.2 * (log.scans[1].stamp - log.scans[0].stamp)
+    rear = replace(log.scans[0], stamp=later, sensor="rear", T_base_laser=SE2(-0.3, 0.0, 3.0))
+    scans = (log.scans[0], rear, *log.scans[1:])
+    two = replace(log, scans=scans, truth=None, runs=None, sensors=np.array([0, 1] + [0] * (N - 1)))
+    drive = plan_drive(two, SE2(1.5, 1.5, 0.0))
+    assert [sight.index for sight in drive.sights] == [0, 2, 3, 4, 5, 6]
+    assert drive.skipped == 0
+    assert [len(sight.others) for sight in drive.sights] == [1, 1, 0, 0, 0, 0]  # 0.15 s apart
+    then, now = log.odometry.at(later), drive.sights[0].T_odom_base
+    (moved,) = drive.sights[0].others
+    assert (now @ moved.T_base_laser).distance_to(then @ rear.T_base_laser) < 1e-9

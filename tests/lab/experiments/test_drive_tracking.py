@@ -53,6 +53,23 @@ def test_a_drive_is_tracked_to_its_end(hall_plan: OccupancyGrid, driven: Recordi
     assert {scan.covariance.shape for scan in tracked} == {(3, 3)}
 
 
+def test_a_laser_behind_helps_one_that_is_covered(
+    hall_plan: OccupancyGrid, driven: Recording
+) -> None:
+    covered = replace(driven.scans[0], ranges=np.full(len(driven.scans[0]), np.nan, np.float32))
+    front = tuple(replace(covered, stamp=scan.stamp, sensor="front") for scan in driven.scans)
+    pairs = zip(front, driven.scans, strict=True)
+    two = replace(
+        driven,
+        scans=tuple(scan for pair in pairs for scan in pair),
+        truth=None if driven.truth is None else np.repeat(driven.truth, 2, axis=0),
+        sensors=np.tile([0, 1], len(driven)),
+    )
+    assert [e.metres for e in errors(follow(hall_plan, two))] == pytest.approx(
+        [e.metres for e in errors(follow(hall_plan, driven))], abs=0.15
+    )
+
+
 def test_between_updates_odometry_moves_the_pose(
     hall_plan: OccupancyGrid, driven: Recording
 ) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from firstfix.core.errors import ScanError
 from firstfix.core.recording import Recording
@@ -13,7 +13,7 @@ from firstfix.lab.experiments.case import truth_at
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """One scan of a drive, with odometry and truth at its stamp.
+    """The scans of one time of a drive, with odometry and truth at the stamp of the first sensor.
 
     Parameters
     ----------
@@ -29,6 +29,8 @@ class Sight:
         ``T_map_base`` of a new start; None to continue from the scan before.
     same_run : bool
         False if the robot moved unobserved since the scan before.
+    others : tuple of LaserScan
+        Those of the other sensors, moved by odometry to its stamp.
     """
 
     index: int
@@ -37,6 +39,7 @@ class Sight:
     truth: SE2 | None
     begin_at: SE2 | None
     same_run: bool
+    others: tuple[LaserScan, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,26 +86,35 @@ def plan_drive(recording: Recording, start: SE2 | None) -> Drive:
     ScanError
         If no scan has odometry, or no true pose is known where one is needed.
     """
-    usable = known_odometry(recording)
+    known = dict(known_odometry(recording))
+    groups = [[i for i in group if i in known] for group in recording.instants()]
+    usable = [group for group in groups if group]
+    if not usable:
+        raise ScanError("No scan of the first topic has odometry at its stamp. Leave it out.")
     first = usable[0][0] if start is not None else _first_true(recording, usable)
+    begun = next(n for n, group in enumerate(usable) if group[0] == first)
     sights: list[Sight] = []
-    for index, T_odom_base in usable:
-        if index < first:
-            continue
+    for index, *others in usable[begun:]:
+        T_odom_base = known[index]
         truth = truth_at(recording, index)
         before = sights[-1].index if sights else None
         same_run = before is not None and _is_same_run(recording, before, index)
         begin_at = None if same_run else truth
         if before is None and start is not None:
             begin_at = start
+        moved = tuple(_moved(recording.scans[i], T_odom_base, known[i]) for i in others)
         scan = recording.scans[index]
-        sights.append(Sight(index, scan, T_odom_base, truth, begin_at, same_run))
-    blind = len(recording) - len(usable)
+        sights.append(Sight(index, scan, T_odom_base, truth, begin_at, same_run, moved))
     return Drive(
         sights=tuple(sights),
-        skipped=len(recording) - len(sights),
-        notes=_notes(sights, blind, len(usable) - len(sights)),
+        skipped=len(groups) - len(sights),
+        notes=_notes(sights, len(groups) - len(usable), begun),
     )
+
+
+def _moved(scan: LaserScan, T_odom_base: SE2, T_odom_then: SE2) -> LaserScan:
+    """Return a scan with the pose of its sensor seen from where the base is at another time."""
+    return replace(scan, T_base_laser=T_odom_base.inverse() @ T_odom_then @ scan.T_base_laser)
 
 
 def known_odometry(recording: Recording) -> list[tuple[int, SE2]]:
@@ -135,8 +147,8 @@ def known_odometry(recording: Recording) -> list[tuple[int, SE2]]:
     return usable
 
 
-def _first_true(recording: Recording, usable: list[tuple[int, SE2]]) -> int:
-    for index, _ in usable:
+def _first_true(recording: Recording, usable: list[list[int]]) -> int:
+    for index, *_ in usable:
         if truth_at(recording, index) is not None:
             return index
     raise ScanError(

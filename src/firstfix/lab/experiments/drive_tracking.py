@@ -105,18 +105,18 @@ def follow_drive(
     track: Track | None = None
     covariance = start_covariance
     for sight in drive.sights:
-        T_odom_base, scan, before = sight.T_odom_base, sight.scan, track
+        T_odom_base, scans, before = sight.T_odom_base, (sight.scan, *sight.others), track
         cpu = time.thread_time()
         if sight.begin_at is not None:
             particles = around_pose(sight.begin_at, covariance, config.max_particles, rng)
-            track = tracker.begin(particles, T_odom_base, scan, rng)
+            track = tracker.begin(particles, T_odom_base, scans, rng)
             covariance = TRUE_START
         else:
             assert track is not None  # noqa: S101 - the first scan of a drive has a start
-            track = tracker.follow(track, T_odom_base, scan, rng)
+            track = tracker.follow(track, T_odom_base, scans, rng)
         T_map_odom, found = track.T_map_odom, track.state.estimate.covariance
         if fields is not None:
-            pose, found = fuse_with_scan(T_map_odom @ T_odom_base, found, scan, fields)
+            pose, found = fuse_with_scan(T_map_odom @ T_odom_base, found, scans, fields)
             T_map_odom = pose @ T_odom_base.inverse()
         yield TrackedScan(
             sight=sight,

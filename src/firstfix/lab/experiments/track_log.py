@@ -233,6 +233,7 @@ def search_and_follow(
     """
     odometry = dict(known_odometry(recording))
     index_at = {scan.stamp: i for i, scan in enumerate(recording.scans)}
+    instant_of = {i: n for n, group in enumerate(recording.instants()) for i in group}
     localizer = Localizer(LocalizerConfig(amcl=config))
     began_at = recording.scans[0].stamp
     localizer.handle(NewMap(began_at, grid))
@@ -248,7 +249,7 @@ def search_and_follow(
             # A scan of a sensor with another clock has the stamp of odometry.
             if isinstance(output, TrackedPose) and output.stamp in index_at:
                 index = index_at[output.stamp]
-                before = tracked[-1].sight.index if tracked else None
+                before = tracked[-1].sight.index if tracked else -1
                 found = _found_in(outputs)
                 sight = Sight(
                     index=index,
@@ -256,7 +257,8 @@ def search_and_follow(
                     T_odom_base=odometry[index],
                     truth=truth_at(recording, index),
                     begin_at=found.T_map_base if found is not None else None,
-                    same_run=found is None and before == index - 1,
+                    same_run=found is None
+                    and instant_of.get(index, index) - instant_of.get(before, index) == 1,
                 )
                 tracked.append(_tracked(sight, output, localizer, cpu_s))
                 cpu_s = 0.0
@@ -267,7 +269,7 @@ def search_and_follow(
         raise NeverFoundError(f"found at none of {len(recording)} scans: {reason}")
     return Drive(
         sights=tuple(scan.sight for scan in tracked),
-        skipped=len(recording) - len(tracked),
+        skipped=max(0, len(recording.instants()) - len(tracked)),
         notes=_notes(recording, tracked),
     ), tracked
 
@@ -294,7 +296,8 @@ def _notes(recording: Recording, tracked: list[TrackedScan]) -> tuple[str, ...]:
     first = tracked[0].sight
     waited = first.scan.stamp - recording.scans[0].stamp
     again = sum(scan.sight.begin_at is not None for scan in tracked) - 1
-    silent = len(recording) - first.index - len(tracked)
+    after = sum(group[0] >= first.index for group in recording.instants())
+    silent = after - len(tracked)
     notes = [f"found after {waited:.1f} s, at scan {first.index}"]
     if again:
         notes.append(f"found elsewhere {again} more time(s)")
