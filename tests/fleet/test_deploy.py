@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
 import importlib.util
 import os
 import re
@@ -71,6 +72,16 @@ def test_compose_names_files_and_ports_that_exist() -> None:
     assert named == set(compose["volumes"])
     assert all(port.startswith("127.0.0.1:") for port in broker["ports"])  # it has no users
     assert shlex.join(broker["command"]) == "mosquitto -c /mosquitto-no-auth.conf"
+
+
+def test_the_image_has_the_ray_that_is_tested() -> None:
+    needed, image = (DEPLOY.parent / "pyproject.toml"), DEPLOY / "fleet-ray.Dockerfile"
+    (oldest,) = re.findall(r"ray\[serve\]>=(\d+\.\d+)", needed.read_text())
+    (in_image,) = re.findall(r"^FROM rayproject/ray:(\S+?)-", image.read_text(), re.MULTILINE)
+    assert in_image == f"{oldest}.0"
+    if importlib.util.find_spec("ray") is None:
+        missing("ray", "no Ray: pip install 'firstfix[ray]'")
+    assert importlib.metadata.version("ray") == in_image
 
 
 def test_the_rayservice_is_one() -> None:

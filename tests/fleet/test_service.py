@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import importlib.util
 import io
 import os
 import re
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -16,6 +19,7 @@ import numpy as np
 import pytest
 from fleet_lab import FleetServer, as_message, scan_of
 from prometheus_client.parser import text_string_to_metric_families
+from required import missing
 
 from firstfix.core.se2 import SE2
 from firstfix.site.site import Site
@@ -176,7 +180,7 @@ def test_other_hostile_requests_are_refused(server: FleetServer) -> None:
 
 
 def test_many_robots_at_once_are_all_answered(server: FleetServer) -> None:
-    rooms = ["ground", "first", "second"] * 7
+    rooms = ["ground", "first", "second"] * 4
     bodies = [{"scans": [as_message(scan_of(room, POSE, seed=i))]} for i, room in enumerate(rooms)]
     with ThreadPoolExecutor(len(bodies)) as robots:
         answers = list(robots.map(lambda body: ask(server, **body), bodies))
@@ -189,8 +193,8 @@ def test_a_killed_worker_is_replaced_and_nothing_is_wrong(server: FleetServer) -
     body = {"scans": [as_message(scan_of("first", POSE))]}
     before = server.workers()
     assert len(before) == 2
-    with ThreadPoolExecutor(8) as robots:
-        asked = [robots.submit(server.http.post, "/v1/locate", json=body) for _ in range(24)]
+    with ThreadPoolExecutor(5) as robots:
+        asked = [robots.submit(server.http.post, "/v1/locate", json=body) for _ in range(10)]
         time.sleep(0.05)
         os.kill(before[0], signal.SIGKILL)
         responses = [each.result() for each in asked]
@@ -223,10 +227,13 @@ def test_metrics(server: FleetServer) -> None:
     assert values["firstfix_worker_memory_bytes", "0"] > 1e7
 
 
-def test_a_token_is_needed_but_for_the_state_and_the_page(
-    serve: Callable[..., FleetServer], rooms: Path
-) -> None:
-    server = serve(rooms, "--workers", "1", "--token", "open-sesame")
+@pytest.fixture(scope="module")
+def guarded(serve: Callable[..., FleetServer], rooms: Path) -> FleetServer:
+    return serve(rooms, "--workers", "1", "--token", "open-sesame")
+
+
+def test_a_token_is_needed_but_for_the_state_and_the_page(guarded: FleetServer) -> None:
+    server = guarded
     for path in ("/", "/static/fleet.js", "/static/fleet.css", "/healthz", "/openapi.json"):
         assert server.http.get(path).status_code == 200, path
     # Maps are not prepared yet, which is no error.
@@ -241,7 +248,6 @@ def test_a_token_is_needed_but_for_the_state_and_the_page(
     if early.status_code == 503:
         assert early.json()["detail"].endswith("maps are not prepared yet. Try again later.")
         assert early.headers["retry-after"] == "1"
-    server.stop()
 
 
 def test_the_document_has_all_routes(server: FleetServer) -> None:
@@ -253,6 +259,27 @@ def test_the_document_has_all_routes(server: FleetServer) -> None:
         for method in {"get", "post", "delete"} & set(item):
             answer = server.http.request(method, path.replace("{robot}", "nobody"))
             assert str(answer.status_code) in item[method]["responses"], (method, path)
+
+
+@pytest.mark.slow
+def test_schemathesis_finds_no_deviation_from_the_document(server: FleetServer) -> None:
+    if importlib.util.find_spec("schemathesis") is None:
+        missing("schemathesis", "no schemathesis: pip install schemathesis")
+    arguments = (
+        *("--seed", "1", "--max-examples", "10", "--generation-deterministic"),
+        *("--workers", "1", "--no-color"),
+        # For a schema, any bytes may be an .npz.
+        *("--exclude-checks", "positive_data_acceptance"),
+    )
+    url = f"{server.http.base_url}".rstrip("/") + "/openapi.json"
+    command = [sys.executable, "-m", "schemathesis.cli", "run", url]
+    ended = subprocess.run(
+        [*command, *arguments], capture_output=True, text=True, timeout=240, check=False
+    )
+    assert ended.returncode == 0, ended.stdout[-4000:] + ended.stderr[-2000:]
+    assert "Tested: 9" in ended.stdout
+    for name in server.http.get("/v1/robots").json()["robots"]:
+        server.http.delete(f"/v1/robots/{name}")
 
 
 @pytest.mark.parametrize(
@@ -272,12 +299,10 @@ def test_wrong_options_are_one_sentence(
     assert text.startswith(f"firstfix: {sentence}")
 
 
-def test_the_end_leaves_no_process(serve: Callable[..., FleetServer], rooms: Path) -> None:
-    server = serve(rooms, "--workers", "1")
-    server.wait_until_ready()
-    workers = server.workers()
+def test_the_end_leaves_no_process(guarded: FleetServer) -> None:
+    workers = guarded.wait_until_ready().workers()
     assert workers
-    assert server.stop() == 0
+    assert guarded.stop() == 0
     deadline = time.monotonic() + 10.0
     while any(Path(f"/proc/{pid}").exists() for pid in workers):
         assert time.monotonic() < deadline

@@ -111,8 +111,8 @@ class _Api:
             Route("/v1/maps", self.maps),
             Route("/v1/locate", self.locate, methods=["POST"]),
             Route("/v1/robots", self.robots),
-            Route("/v1/robots/{robot}", self.robot),
-            Route("/v1/robots/{robot}", self.forget, methods=["DELETE"]),
+            # Two routes would each name only their own method in Allow.
+            Route("/v1/robots/{robot}", self.robot, methods=["GET", "DELETE"]),
             Route("/v1/robots/{robot}/scans", self.robot_scans, methods=["POST"]),
             Mount("/static", StaticFiles(directory=STATIC)),
         ]
@@ -162,14 +162,15 @@ class _Api:
         return _json(Robots(self._service.sessions.names()))
 
     async def robot(self, request: Request) -> Response:
-        """Return the last answer to a robot."""
+        """Return the last answer to a robot, or forget it."""
+        if request.method == "DELETE":
+            return self._forget(request)
         robot = self._service.sessions.find(_robot(request))
         if robot is None or robot.answer is None:
             raise HTTPException(404, "This robot has not reported, or not for a long time.")
         return _json(robot.answer)
 
-    async def forget(self, request: Request) -> Response:
-        """Forget a robot."""
+    def _forget(self, request: Request) -> Response:
         if not self._service.sessions.forget(_robot(request)):
             raise HTTPException(404, "This robot has not reported, or not for a long time.")
         return Response(status_code=204)
