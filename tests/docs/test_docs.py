@@ -43,6 +43,23 @@ def test_settings_are_those_of_the_dataclasses():
     assert written == script("make_settings").page(), "run: python docs/make_settings.py"
 
 
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md", "docs/experiments.md"])
+def test_figures_are_those_of_the_one_file(page):
+    pages = script("make_figures")
+    text = (ROOT / page).read_text(encoding="utf-8")
+    assert text == pages.current(ROOT / page), "run: python docs/make_figures.py"
+
+
+def test_each_figure_has_a_sample_and_a_section():
+    for row in script("make_figures").figures():
+        page, _, anchor = row["link"].partition("#")
+        headings = re.findall(
+            r"^##+ (.*)$", (DOCS / page).read_text(encoding="utf-8"), re.MULTILINE
+        )
+        anchors = {re.sub(r"[^\w -]", "", h.lower()).replace(" ", "-") for h in headings}
+        assert not anchor or anchor in anchors, row["link"]
+
+
 def test_the_table_of_topics_is_current():
     page = (DOCS / "ros.md").read_text(encoding="utf-8")
     assert page == script("make_settings").with_tables(page), "run: python docs/make_settings.py"

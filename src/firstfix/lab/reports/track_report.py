@@ -115,7 +115,7 @@ def draw_track(grid: OccupancyGrid, tracked: Sequence[TrackedScan], path: Path, 
     axes.plot(*track[0], "o", color=GREEN, ms=9, mec="white", zorder=7, label="start")
     axes.plot(*track[-1], "s", color=RED, ms=9, mec="white", zorder=7, label="end")
     axes.set(xlim=(west, east), ylim=(south, north), title=title)
-    legend = figure.legend(loc="outside lower center", ncols=6)
+    legend = figure.legend(loc="outside lower center", ncols=max(2, round(width / 3.5)))
     for handle in legend.legend_handles:
         if handle is not None and hasattr(handle, "set_sizes"):
             handle.set_sizes([30.0])  # the points themselves are too small for a legend

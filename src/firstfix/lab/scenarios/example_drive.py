@@ -19,7 +19,7 @@ def simulate_drive(world: str = "office", seed: int = 0) -> tuple[OccupancyGrid,
     Parameters
     ----------
     world : str
-        ``"office"``, ``"rooms"``, ``"warehouse"``, ``"house"`` or ``"corridor"``.
+        ``"office"``, ``"rooms"``, ``"warehouse"``, ``"house"``, ``"corridor"`` or ``"hotel"``.
     seed : int
         Seed of the places, the noise and the wheel slip, at least 0.
 
