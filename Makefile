@@ -12,7 +12,7 @@ CASES ?= $(wildcard ../shared/cases/*/)
 # Where Python may not keep what it parsed, every process of a test parses everything again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check bench recording docs dist sign release-matrix lock clean
+.PHONY: demo test check kernels style bench recording docs dist sign release-matrix lock clean
 
 # Python compiles what it imports, which is a small part of what pip would compile.
 $(USER_STAMP): pyproject.toml
@@ -32,16 +32,23 @@ demo: $(USER_STAMP)
 	fi
 
 # A cluster of Ray fills the machine: its tests run after the others, and one by one.
-test: $(STAMP)
+test: kernels
 	$(BIN)/python -m pytest -n 4 --dist worksteal $(or $(TEST_ARGS),-m "not cluster")
 	$(if $(TEST_ARGS),,$(BIN)/python -m pytest -m cluster tests/fleet)
 
 check: $(STAMP)
+	$(MAKE) -j 2 kernels style
+	$(BIN)/python -m pytest -n 3 --dist worksteal -q -m "not slow" $(TEST_ARGS)
+
+# In a fresh clone every process that runs tests would compile the same kernels at the same time.
+kernels: $(STAMP)
+	$(BIN)/firstfix doctor
+
+style: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest -n 3 --dist worksteal -q -m "not slow" $(TEST_ARGS)
 
 bench: $(STAMP)
 	$(BIN)/firstfix bench --suite paper --out out/paper.json --report out/paper

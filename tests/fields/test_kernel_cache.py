@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import gc
 import importlib
 import os
 import shutil
@@ -14,6 +15,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from numba.core import event
 from numba.core.dispatcher import Dispatcher
 
 from firstfix.fields import kernel_cache
@@ -52,6 +54,33 @@ def test_every_constant_and_callee_of_a_kernel_is_hashed():
             value = function.__globals__.get(name)
             if isinstance(value, (int, float, tuple, np.generic, np.ndarray, Dispatcher)):
                 assert definition_of(name, function.__module__) in hashed, (function, name)
+
+
+def test_every_file_with_a_kernel_is_hashed():
+    hashed = set(kernel_sources())
+    for file in PACKAGE.rglob("*.py"):
+        if "\n@kernel\n" in file.read_text(encoding="utf-8"):
+            assert file in hashed
+
+
+def test_garbage_is_collected_again_after_a_kernel_was_compiled():
+    collects = []
+
+    @kernel
+    def double(x: int) -> int:
+        return 2 * x
+
+    class Listener(event.Listener):
+        def on_start(self, _: event.Event) -> None:
+            collects.append(gc.isenabled())
+
+        def on_end(self, _: event.Event) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Listener()):
+        assert double(2) == 4
+    assert collects == [False]
+    assert gc.isenabled()
 
 
 def test_no_kernel_is_compiled_past_the_cache():

@@ -8,6 +8,7 @@ and forth between two states.
 from __future__ import annotations
 
 import contextlib
+import gc
 import hashlib
 import logging
 import os
@@ -31,7 +32,7 @@ _EVENTS: Any = event
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 PACKAGE = Path(__file__).parents[1]
-_FOLDERS = ("amcl", "belief", "fields", "global_localization", "lab/simulation")
+_FOLDERS = ("amcl", "belief", "changes", "fields", "global_localization", "lab/simulation")
 _CONSTANTS = ("core/angles.py", "fields/search_grid.py")
 
 # Less to compile: no check for a division by zero, no entry point for C.
@@ -117,13 +118,28 @@ def _remove_unused(parent: Path, used: Path) -> None:
                 shutil.rmtree(folder, ignore_errors=True)
 
 
-class _Announcer(event.Listener):
-    """Logs once in a process that kernels are compiled; those on disk are loaded instead."""
+class _Compilation(event.Listener):
+    """Logs once in a process that kernels are compiled; those on disk are loaded instead.
+
+    Meanwhile no garbage is collected: a compiler makes many objects that stay, and looking through
+    them again and again takes 6 % of its time. Numba holds a lock between start and end, and
+    compiles callees in between.
+    """
+
+    def __init__(self) -> None:
+        self._depth = 0
+        self._is_announced = False
+        self._collects = False
 
     def on_start(self, started: Any) -> None:
-        """Log before the first kernel."""
-        if started.data["dispatcher"].py_func.__module__.startswith("firstfix."):
-            _EVENTS.unregister("numba:compile", self)
+        """Log before the first kernel, and stop the collector."""
+        if self._depth == 0:
+            self._collects = gc.isenabled()
+            gc.disable()
+        self._depth += 1
+        module = started.data["dispatcher"].py_func.__module__
+        if not self._is_announced and module.startswith("firstfix."):
+            self._is_announced = True
             _log.warning(
                 "Compiling kernels, once on this machine: up to half a minute. "
                 "They are kept in %s.",
@@ -131,7 +147,10 @@ class _Announcer(event.Listener):
             )
 
     def on_end(self, _: Any) -> None:
-        """Log nothing."""
+        """Start the collector again after the outermost function."""
+        self._depth -= 1
+        if self._depth == 0 and self._collects:
+            gc.enable()
 
 
-_EVENTS.register("numba:compile", _Announcer())
+_EVENTS.register("numba:compile", _Compilation())
