@@ -27,7 +27,7 @@ directions = np.arange(DIRECTIONS) * (FULL_TURN / DIRECTIONS)
 def build(grid):
     positions = build_search_grid(grid)
     return positions, build_range_table(
-        chessboard_clearance(grid.occupied), grid.resolution, positions
+        grid.occupied, chessboard_clearance(grid.occupied), grid.resolution, positions
     )
 
 

@@ -3,24 +3,21 @@
 A scan from this block lies between the two, whatever its place in the block, up to noise and
 changes. So a first look needs a quarter of the positions and half of the headings of the search.
 
-The ranges are not cast ray by ray. For one direction, the range of a cell is that of the next cell
-along the ray and one step more, so that one sweep over the map gives the ranges of all cells:
-Danielsson's idea for distances (1980), along one direction. A digital line may pass a corner that
-the exact ray touches: 2 % of the ranges differ by more than 0.1 m, 1 % by more than 0.4 m.
+The ranges are not cast ray by ray, but swept (`fields.sweep`).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.core.angles import FULL_TURN
 from firstfix.fields.kernel_cache import kernel
-from firstfix.fields.range_table import FARTHEST, REACH_M, UNIT_M
+from firstfix.fields.range_table import FARTHEST, UNIT_M
+from firstfix.fields.sweep import Line, free_cells, in_threads, lines, next_row
 
 LOOK_DIRECTIONS = 64
 """Directions, and headings of the first look."""
@@ -117,29 +114,15 @@ def build_look_table(
     low = np.full((LOOK_DIRECTIONS, len(rows)), FARTHEST, np.uint8)
     high = np.zeros((LOOK_DIRECTIONS, len(rows)), np.uint8)
     for upright in (True, False):
-        walls = np.ascontiguousarray(occupied if upright else occupied.T)
-        height = len(walls)
-        free = np.pad(~walls, 1, constant_values=True).view(np.uint8)
-        del walls
+        free = free_cells(occupied, upright)
         starts, order, places = _bands(rows if upright else columns, samples, stride, upright)
-        found = np.empty((2, len(rows)), np.uint8)
-        for i in range(directions):
-            angle = i * (FULL_TURN / directions)
-            along, across = math.sin(angle), math.cos(angle)
-            if (abs(along) >= abs(across)) is not upright:
-                continue
-            if not upright:
-                along, across = across, along
-            offsets = np.floor(np.arange(height) * (across / along) + 0.5).astype(np.int64)
-            far = np.uint16(math.ceil(REACH_M / resolution * abs(along)) + 1)
-            scale = resolution / abs(along) / UNIT_M
-            step = -1 if along > 0.0 else 1
-            _sweep(free, offsets, step, far, stride, starts, places, scale, found)
+        sweep = partial(_swept, free, starts, places, resolution, stride)
+        for line, found in in_threads(sweep, lines(directions, len(free) - 2, upright)):
             # A direction of the table covers the sweeps halfway to its neighbours.
-            for d in {i // _BETWEEN, -(-i // _BETWEEN) % LOOK_DIRECTIONS}:
+            for d in {line.index // _BETWEEN, -(-line.index // _BETWEEN) % LOOK_DIRECTIONS}:
                 low[d, order] = np.minimum(low[d, order], found[0])
                 high[d, order] = np.maximum(high[d, order], found[1])
-        del free, places
+        del free, places, sweep
     bounds = np.empty((len(rows), 2, LOOK_DIRECTIONS), np.uint8)
     bounds[:, 0], bounds[:, 1] = low.T, high.T
     return LookTable(stride, rows, columns, bounds)
@@ -243,10 +226,38 @@ def _choose_samples(
         out[0, i], out[1, i] = out[0, i - n], out[1, i - n]
 
 
+def _swept(
+    free: NDArray[np.uint8],
+    starts: NDArray[np.int64],
+    places: NDArray[np.uint32],
+    resolution: float,
+    stride: int,
+    line: Line,
+) -> NDArray[np.uint8]:
+    """Return the shortest and longest range of every entry in one direction, shape (2, n)."""
+    counts_per_step = 0.5 * resolution * line.per_row / UNIT_M
+    far = np.uint16(math.ceil(FARTHEST / counts_per_step) + 1)
+    found = np.empty((2, places.shape[1]), np.uint8)
+    _sweep(
+        free,
+        line.columns,
+        line.turns,
+        line.step,
+        far,
+        stride,
+        starts,
+        places,
+        counts_per_step,
+        found,
+    )
+    return found
+
+
 @kernel
 def _sweep(  # noqa: PLR0913 - a kernel takes its arrays one by one
     free: NDArray[np.uint8],
-    offsets: NDArray[np.int64],
+    line: NDArray[np.int64],
+    turns: NDArray[np.uint16],
     step: int,
     far: np.uint16,
     stride: int,
@@ -255,29 +266,15 @@ def _sweep(  # noqa: PLR0913 - a kernel takes its arrays one by one
     scale: float,
     found: NDArray[np.uint8],
 ) -> None:
-    """Count the rows to the wall along one direction, from its far end, a band of blocks at a time.
-
-    ``free`` has a margin of one cell. ``step`` leads from the far end to the sensor; ``offsets`` is
-    the digital line: its column in every row. The shortest and longest ranges of the samples of
-    each entry are written to ``found``.
-    """
+    """Sweep from the far end, and write the shortest and longest ranges a band at a time."""
     height, width = free.shape[0] - 2, free.shape[1] - 2
     band = np.empty((stride, width), np.uint16)
-    after = np.full(width + 2, far, np.uint16)  # the row before in this sweep
-    one = np.uint16(1)
+    after = np.full(width + 2, far, np.uint16)
     for i in range(height):
         r = i if step > 0 else height - 1 - i
-        shift = 1 + (offsets[r - step] - offsets[r] if i > 0 else 0)
-        row, here = band[r % stride], free[r + 1, 1:]
-        ahead, beside, diagonal = after[shift:], free[r + 1 - step, 1:], free[r + 1, shift:]
-        # Unsigned indices cannot count from the end of an array: LLVM can vectorise the loop.
-        for c in range(np.uint64(width)):
-            # Between two walls that touch at a corner only, a line does not pass.
-            passes = np.uint16(beside[c] | diagonal[c])
-            count = min(np.uint16(np.uint16(ahead[c] * passes) + one), far)
-            row[c] = np.uint16(count * here[c])
-        for c in range(np.uint64(width)):
-            after[c + np.uint64(1)] = row[c]
+        shift = 1 + line[r + 1 - step] - line[r + 1]
+        beside = free[r + 1, shift:] if turns[r] == 1 else free[r + 1 - step, 1:]
+        next_row(after, free[r + 1, 1:], beside, shift, turns[r], far, band[r % stride])
         block = r // stride
         is_whole = i == height - 1 or (r + step) // stride != block
         if is_whole and block + 1 < starts.shape[0]:
@@ -300,6 +297,6 @@ def _find_bounds(
         for j in range(places.shape[2]):
             count = band[places[0, k, j], places[1, k, j]]
             shortest, longest = min(shortest, count), max(longest, count)
-        # A wall begins half a step before the middle of its cell.
-        found[0, k] = np.uint8(min(farthest, max(0.0, (shortest - 0.5) * scale) + 0.5))
-        found[1, k] = np.uint8(min(farthest, max(0.0, (longest - 0.5) * scale) + 0.5))
+        # A wall begins half a row before the middle of its cell.
+        found[0, k] = np.uint8(min(farthest, max(0.0, (shortest - 1.0) * scale) + 0.5))
+        found[1, k] = np.uint8(min(farthest, max(0.0, (longest - 1.0) * scale) + 0.5))

@@ -34,7 +34,7 @@ NEAR_M = 1.0
 _CHANGE_M = 0.1
 
 # Of the arrays in the folder of fields.
-_VERSION = "fields 3"
+_VERSION = "fields 4"
 _SETTINGS = repr((SPACING_M, BLOCKS, DIRECTIONS, UNIT_M, REACH_M, NEAR_M, MAX_LIMIT))
 
 
@@ -169,7 +169,9 @@ class MapFields:
         ).packed()
 
     def _build_ranges(self) -> NDArray[np.uint8]:
-        return build_range_table(self.clearance, self.grid.resolution, self.positions)
+        return build_range_table(
+            self.grid.occupied, self.clearance, self.grid.resolution, self.positions
+        )
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:

@@ -149,11 +149,25 @@ def cast_ray_leaping(
     float
         As `cast_ray` returns.
     """
+    return cast_ray_onward(clearance, x, y, dx, dy, 0.0, max_range_cells)
+
+
+@kernel
+def cast_ray_onward(
+    clearance: NDArray[np.uint8],
+    x: float,
+    y: float,
+    dx: float,
+    dy: float,
+    free_to: float,
+    max_range_cells: float,
+) -> float:
+    """Cast a ray that is known to be free up to some length, cells: as `cast_ray_leaping`."""
     step_x, line_x, per_x = _towards(dx)
     step_y, line_y, per_y = _towards(dy)
     height, width = clearance.shape
-    column, row = math.floor(x), math.floor(y)
-    length = 0.0
+    column, row = math.floor(x + dx * free_to), math.floor(y + dy * free_to)
+    length = free_to
     while length < max_range_cells and 0 <= column < width and 0 <= row < height:
         n = int(clearance[row, column])
         if n == 0:
