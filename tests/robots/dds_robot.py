@@ -17,10 +17,10 @@ from cyclonedds.util import duration
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from play import BASE, LASER, play
+from play import TOPICS, places, play
 from scripts import SCRIPTS
 
-from firstfix.io.ros_messages.outgoing import occupancy_grid, transforms
+from firstfix.io.ros_messages.outgoing import occupancy_grid
 from firstfix.ros.dds.types import Cdr, described, encode, make
 
 LATCHED = ("/tf_static", "map")
@@ -28,6 +28,9 @@ TYPES = {
     "/tf": "tf2_msgs/TFMessage",
     "/tf_static": "tf2_msgs/TFMessage",
     "scan": "sensor_msgs/LaserScan",
+    "front/scan": "sensor_msgs/LaserScan",
+    "rear/scan": "sensor_msgs/LaserScan",
+    "points": "sensor_msgs/PointCloud2",
     "map": "nav_msgs/OccupancyGrid",
     "events/cliff": "kobuki/CliffEvent",
     "events/wheel_drop": "kobuki/WheelDropEvent",
@@ -59,15 +62,15 @@ def main() -> None:
         full = f"{options.namespace}/{topic.removeprefix('/')}"
         is_latched = topic in LATCHED and (topic, options.map) != ("map", "volatile")
         kept = Policy.Durability.TransientLocal if is_latched else Policy.Durability.Volatile
-        how = Policy.Reliability.BestEffort if topic == "scan" else RELIABLE
+        is_sensor = topic in {name for name, _ in TOPICS.values()}
+        how = Policy.Reliability.BestEffort if is_sensor else RELIABLE
         writers[topic] = writer(participant, f"rt{full}", kind, how, kept)
 
     def publish(topic: str, message: Any) -> None:
         writers[topic].write(Cdr(encode(TYPES[topic], message)))
 
     grid, scenario, seed = SCRIPTS[options.script]()
-    T_base_laser = scenario.rig.lidars[0].T_base_laser
-    publish("/tf_static", transforms(make, 0.0, BASE, LASER, T_base_laser))
+    publish("/tf_static", places(make, scenario.rig))
     if options.map == "late":
         time.sleep(2.0)
     publish("map", occupancy_grid(make, 0.0, "map", grid))

@@ -25,12 +25,13 @@ import rospy
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from play import BASE, LASER, play
+from play import places, play
 from scripts import SCRIPTS, TOLD
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
-from firstfix.io.ros_messages.outgoing import occupancy_grid, pose_with_covariance, transforms
+from firstfix.io.ros_messages.outgoing import occupancy_grid, pose_with_covariance
+from firstfix.lab.simulation.rigs import Rig
 from firstfix.ros.ros1.types import Empty, make, message_class
 
 # As kobuki_msgs has them, less the comments.
@@ -46,6 +47,9 @@ TYPES = {
     "/tf": "tf2_msgs/TFMessage",
     "/tf_static": "tf2_msgs/TFMessage",
     "scan": "sensor_msgs/LaserScan",
+    "front/scan": "sensor_msgs/LaserScan",
+    "rear/scan": "sensor_msgs/LaserScan",
+    "points": "sensor_msgs/PointCloud2",
     "map": "nav_msgs/OccupancyGrid",
     "initialpose": "geometry_msgs/PoseWithCovarianceStamped",
     "events/cliff": "kobuki/CliffEvent",
@@ -85,9 +89,9 @@ FLAWS = {
 class Robot:
     """What a robot and the people around it publish."""
 
-    def __init__(self, grid: OccupancyGrid, T_base_laser: SE2, flaws: list[str]) -> None:
+    def __init__(self, grid: OccupancyGrid, rig: Rig, flaws: list[str]) -> None:
         self._grid = grid
-        self._T_base_laser = T_base_laser
+        self._rig = rig
         self._flaws = flaws
         self._publishers = {
             topic: rospy.Publisher(topic, _kind(kind), latch=topic in LATCHED, queue_size=50)
@@ -106,7 +110,7 @@ class Robot:
 
     def publish_latched(self) -> None:
         """Publish what does not change."""
-        self.publish("/tf_static", transforms(make, 0.0, BASE, LASER, self._T_base_laser))
+        self.publish("/tf_static", places(make, self._rig))
         self.publish("map", self.map())
 
     def map(self) -> Any:
@@ -158,6 +162,8 @@ def _kind(name: str) -> Any:
 
 def make_any(name: str, /, **fields: Any) -> Any:
     """Build a message, of a Kobuki's too."""
+    if name == "sensor_msgs/PointCloud2":
+        fields["data"] = fields["data"].tobytes()  # rospy has no arrays
     return _kind(name)(**fields) if name.startswith("kobuki/") else make(name, **fields)
 
 
@@ -171,7 +177,7 @@ def main() -> None:
     arguments = parser.parse_args()
     rospy.init_node("robot", anonymous=True)
     grid, scenario, seed = SCRIPTS[arguments.script]()
-    robot = Robot(grid, scenario.rig.lidars[0].T_base_laser, arguments.flaws)
+    robot = Robot(grid, scenario.rig, arguments.flaws)
     if arguments.serve_map:
         rospy.Service("static_map", nav_msgs.srv.GetMap, lambda _: robot.map())
     robot.publish_latched()

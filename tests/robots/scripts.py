@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.lab.scenarios.phases import CarryTo, DriveTo, Phase, Stand
 from firstfix.lab.scenarios.scenario import Scenario
+from firstfix.lab.simulation.rigs import RIGS, Rig
 from firstfix.lab.simulation.simulation import Moment, Simulation
 from firstfix.lab.worlds.catalog import WORLDS, identical_rooms
 
@@ -55,10 +57,19 @@ def twins() -> tuple[OccupancyGrid, Scenario, int]:
     return identical_rooms(4), Scenario((Stand(900.0),)), 4
 
 
+def sensors() -> tuple[OccupancyGrid, Scenario, int]:
+    """Stand, with two lasers, one of which is not enough at rest, and a LIDAR of 3D points."""
+    corners = RIGS["two-lasers"].lidars
+    lasers = (replace(corner, beams=301, fov=math.radians(150.0)) for corner in corners)
+    rig = Rig((*lasers, *RIGS["3d-lidar"].lidars))
+    return WORLDS["office"](), Scenario((Stand(900.0),), rig=rig), 2
+
+
 SCRIPTS: dict[str, Script] = {
     "stand": stand,
     "drive": drive,
     "kidnapped": kidnapped,
     "carried": carried,
     "twins": twins,
+    "sensors": sensors,
 }

@@ -70,6 +70,19 @@ def test_a_robot_at_rest_is_found_and_its_pose_published_once(dds):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("sensors", ["scan_topics:=front/scan rear/scan", "cloud_topics:=points"])
+def test_a_robot_with_several_sensors_is_found(dds, sensors):
+    """One of the lasers alone sees too little to be sure at rest."""
+    poses = dds.ear("/initialpose", POSE)
+    dds.robot("sensors")
+    node = dds.node("-p", sensors)
+    found = wait_for(lambda: poses.received)[0]
+    assert_near(dds.truth(), pose_of(found), 0.1, 0.05)
+    assert node.end() == 0
+    assert "WARN" not in node.log
+
+
+@pytest.mark.slow
 def test_no_pose_is_published_where_places_look_alike(dds):
     poses = dds.ear("/initialpose", POSE)
     places = dds.ear("/hypotheses", "geometry_msgs/PoseArray")

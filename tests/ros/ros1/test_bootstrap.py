@@ -95,3 +95,15 @@ def test_the_robot_is_searched_again_on_request_and_in_another_map(ros1: Lab) ->
     shifted = SE2(10.0, -5.0, 1.5) @ ros1.truth_at(elsewhere["stamp"])
     assert apart(elsewhere, shifted).is_small
     assert not apart(elsewhere, SE2(*found["pose"])).is_small
+
+
+@pytest.mark.parametrize(
+    "sensors", ["_scan_topics:=[front/scan, rear/scan]", "_cloud_topics:=points"]
+)
+def test_a_robot_with_several_sensors_is_found(ros1: Lab, sensors: str) -> None:
+    """One of the lasers alone sees too little to be sure at rest."""
+    watcher = ros1.watch("initialpose")
+    node = ros1.node(sensors)
+    ros1.robot("sensors")
+    assert ros1.error_of(watcher.wait_for("initialpose")).is_small
+    assert "WARN" not in node.output
