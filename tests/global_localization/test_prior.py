@@ -14,12 +14,13 @@ from firstfix.core.estimate import Verdict
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.frames import bases_in_map, to_map
-from firstfix.global_localization.prior import SHARE_WITHOUT_PRIOR
+from firstfix.global_localization.prior import SHARE_WITHOUT_PRIOR, PlacePrior
 from firstfix.global_localization.scan_matcher import ScanMatcher, _with_share_of_prior
 from firstfix.global_localization.verdict import log_likelihoods, with_prior
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import identical_rooms
 
+RNG = np.random.default_rng(7)
 LIDAR = Lidar(beams=180, T_base_laser=SE2(0.2, 0.1, 0.5))
 
 
@@ -87,6 +88,17 @@ def test_a_prior_is_a_second_witness_only_for_the_places_near_it(draw_room):
     assert [result.verdict for result in results] == [Verdict.UNIQUE, Verdict.AMBIGUOUS]
     assert all(result.best.pose.distance_to(truth) < 0.05 for result in results)
     assert "one scan of a sensor" in results[1].reason
+
+
+def test_a_place_near_the_prior_competes_with_all_that_the_search_ranks_as_high():
+    grid = OccupancyGrid(np.zeros((40, 4000), np.int8), 0.05)
+    scan = replace(LIDAR, T_base_laser=SE2.identity()).scan(grid, SE2(1.0, 1.0, 0.0), RNG)
+    poses = np.column_stack([np.arange(400) * 10.0, np.full(400, 20.0), np.zeros(400)])
+    for index, kept in ((30, 40), (3, 13), (395, 400)):
+        known = PlacePrior(Near(SE2(0.5 * index, 1.0, 0.0), 0.1), grid, scan, 180)
+        assert (known.chosen(poses, 10) == poses[:kept]).all()
+    nothing = PlacePrior(Near(SE2(0.0, 1.0, 0.0), 0.1, 0.5), grid, scan, 180)
+    assert len(nothing.chosen(poses + np.array([0.0, 0.0, 3.0]), 10)) == 10
 
 
 def test_a_prior_multiplies_likelihoods():

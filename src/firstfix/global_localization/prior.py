@@ -68,11 +68,16 @@ class PlacePrior:
         return shortlist if self.prior is None else DEEPER * shortlist
 
     def chosen(self, poses: NDArray[np.float64], shortlist: int) -> NDArray[np.float64]:
-        """Keep the first poses, shape (n, 3), and as many of the others that are near the prior."""
+        """Keep the first poses, shape (n, 3), and as many of the others that are near the prior.
+
+        The best one near the prior competes with all that the search ranks above it, and with as
+        many below: places that look like it are there. Else it would win by their absence.
+        """
         if self.prior is None:
             return poses
         near = np.flatnonzero(self._logs(poses) >= NEAR_LOG)
-        first = np.arange(min(shortlist, len(poses)))
+        best = int(near[0]) + shortlist if len(near) else shortlist
+        first = np.arange(min(max(shortlist, best), len(poses)))
         kept: NDArray[np.float64] = poses[np.unique(np.concatenate([first, near[:shortlist]]))]
         return kept
 
