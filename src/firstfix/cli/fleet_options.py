@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import Enum
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -53,6 +54,9 @@ FleetVersionOption = Annotated[
     FleetVersion, typer.Option("--vda5050-version", help="Version of VDA 5050.")
 ]
 
+# The id of the map of a site in use before one is found.
+_UNKNOWN = "unknown"
+
 
 @contextmanager
 def fleet_bridge(
@@ -62,8 +66,11 @@ def fleet_bridge(
     map_id: str | None,
     maps: list[str] | None,
     version: FleetVersion,
+    site: Path | None = None,
 ) -> Iterator[Bridge | None]:
     """Give the bridge of these options while it runs; None without --vda5050.
+
+    The maps of a site have names of their own.
 
     Raises
     ------
@@ -81,9 +88,14 @@ def fleet_bridge(
             raise InputError(f"{unused[0]} is of no use without --vda5050 URL. Add it.")
         yield None
         return
+    if site is not None:
+        if unused := [n for n, v in {"--map-id": map_id, "--vda5050-map": maps}.items() if v]:
+            raise InputError(f"{unused[0]} is of no use with --site, whose maps have ids.")
+        needed["--map-id"] = _UNKNOWN
     if missing := [name for name, value in needed.items() if not value]:
         raise InputError(f"--vda5050 needs {' and '.join(missing)} as well.")
-    with _bridge(url, f"{manufacturer}", f"{serial_number}", f"{map_id}", maps, version) as bridge:
+    named = f"{needed['--map-id']}"
+    with _bridge(url, f"{manufacturer}", f"{serial_number}", named, maps, version) as bridge:
         yield bridge
 
 

@@ -70,7 +70,7 @@ def ros1(
     """
     adapter = _load("ros1")
     with fleet_bridge(
-        vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version
+        vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version, site
     ) as bridge:
         adapter.run([*context.args, *_for_ros1(own_site(site))], _maker(bridge))
 
@@ -92,7 +92,7 @@ def ros2(
     """
     adapter = _load("ros2")
     with fleet_bridge(
-        vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version
+        vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version, site
     ) as bridge:
         adapter.run([*context.args, *_for_ros2(own_site(site))], _maker(bridge))
 
@@ -150,7 +150,7 @@ def dds(
         options=options,
     )
     with fleet_bridge(
-        vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version
+        vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version, site
     ) as bridge:
         adapter.run(config, names, _maker(bridge))
 

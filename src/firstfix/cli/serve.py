@@ -150,7 +150,7 @@ def serve(
     if (map_ is None) is (site is None):
         raise InputError("Give either a map or --site SITE.")
     with fleet_bridge(
-        vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version
+        vda5050, manufacturer, serial_number, map_id, vda5050_map, vda5050_version, site
     ) as bridge:
         if robot is Transport.SIM:
             building = _building(map_) if site is None else _buildings(site)

@@ -169,6 +169,8 @@ class MapHint:
         The map.
     source : str
         Where it comes from, in the words that people will read.
+    T_map_base : SE2, optional
+        The pose there, known to a metre and 40 degrees, as in a `PoseHint`.
 
     Examples
     --------
@@ -180,6 +182,7 @@ class MapHint:
     stamp: float
     map_id: str
     source: str = "a person"
+    T_map_base: SE2 | None = None
 
 
 Input = (

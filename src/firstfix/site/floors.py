@@ -225,7 +225,11 @@ class SiteLocalizer:
             reason = f"{source} says that this is {named}: the next view verifies it"
             return [self._open(given.stamp, reason)]
         reason = f"{source} says that this is {named}: searching there first"
-        said = self._start_search(given.stamp, reason, {named: None})
+        prior = None
+        if given.T_map_base is not None:
+            known = PoseHint(given.stamp, given.T_map_base)  # its defaults
+            prior = Near(known.T_map_base, known.radius, known.angle)
+        said = self._start_search(given.stamp, reason, {named: prior})
         self._hinted = named
         return said
 

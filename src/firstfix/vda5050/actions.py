@@ -12,7 +12,7 @@ import msgspec
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
 from firstfix.localizer.hint import read_hint
-from firstfix.localizer.inputs import Input, NewMap, PoseHint, Reset
+from firstfix.localizer.inputs import Input, MapHint, NewMap, PoseHint, Reset
 from firstfix.localizer.outputs import InitialPose, Output, Status
 from firstfix.localizer.states import State
 from firstfix.vda5050.localization import Localization
@@ -35,7 +35,9 @@ class _Check:
     """A pose that the localizer verifies."""
 
     action_id: str
-    hint: PoseHint
+    given: PoseHint | MapHint
+    T_map_base: SE2
+    map_id: str
     last_node_id: str
     has_begun: bool = False
 
@@ -121,29 +123,40 @@ class Actions:
         check = self._check
         if check is None:
             return
-        if given is check.hint:
+        if given is check.given:
             self._check = check = replace(check, has_begun=True)
-        elif check.has_begun and isinstance(given, NewMap | Reset | PoseHint):
+        elif check.has_begun and self._replaces(given):
             self._end(ActionStatus.FAILED, "another pose, map or reset came before the result")
             return
         if check.has_begun:
             for output in outputs:
                 self._judge(check, output)
 
+    def _replaces(self, given: Input) -> bool:
+        """Tell whether an input ends a check. In a site a `NewMap` only names the map found."""
+        if isinstance(given, NewMap) and self._maps.has_site:
+            return False
+        return isinstance(given, NewMap | Reset | PoseHint | MapHint)
+
     def _judge(self, check: _Check, output: Output) -> None:
         if isinstance(output, InitialPose):
             found = output.T_map_base
-            hint = read_hint(check.hint, ())
-            away = found.distance_to(check.hint.T_map_base)
+            hint = read_hint(PoseHint(output.stamp, check.T_map_base, source=_SOURCE), ())
+            away = found.distance_to(check.T_map_base)
             where = f"found at ({found.x:.2f}, {found.y:.2f}) m, {math.degrees(found.yaw):.0f}°"
             text = f"{where}, {away:.2f} m from the given pose"
-            if hint is not None and hint.matches(found):
+            is_there = not self._maps.has_site or self._maps.id_in_use == check.map_id
+            if not is_there:
+                self._end(ActionStatus.FAILED, f"{where} of map {self._maps.id_in_use}")
+            elif hint is not None and hint.matches(found):
                 self.last_node_id = check.last_node_id
                 self._end(ActionStatus.FINISHED, text)
             else:
                 self._end(ActionStatus.FAILED, text)
         elif isinstance(output, Status) and self._check is not None:
             pending = {State.VERIFYING_HINT, State.LIFTED, State.DISAMBIGUATING}
+            if self._maps.has_site:
+                pending.add(State.SEARCHING)  # the search of all maps verifies the pose
             if output.state in pending:
                 self._report(check.action_id, ActionStatus.RUNNING, output.reason)
             else:
@@ -184,11 +197,14 @@ class Actions:
         new_map = self._map_for(wanted.map_id)
         if self._check is not None:
             self._end(ActionStatus.FAILED, "replaced by a newer pose of the fleet control")
-        stamp = self._localization.stamp
-        hint = PoseHint(stamp, SE2(wanted.x, wanted.y, wanted.theta), source=_SOURCE)
-        switch = None if new_map is None else NewMap(stamp, new_map.grid)
-        self._check = _Check(action.action_id, hint, wanted.last_node_id)
-        return [hint] if switch is None else [switch, hint]
+        stamp, pose = self._localization.stamp, SE2(wanted.x, wanted.y, wanted.theta)
+        hint: PoseHint | MapHint = PoseHint(stamp, pose, source=_SOURCE)
+        if new_map is not None and new_map.grid is None:
+            hint = MapHint(stamp, wanted.map_id, _SOURCE, pose)
+        self._check = _Check(action.action_id, hint, pose, wanted.map_id, wanted.last_node_id)
+        if new_map is not None and new_map.grid is not None:
+            return [NewMap(stamp, new_map.grid), hint]
+        return [hint]
 
     def _map_for(self, map_id: str) -> KnownMap | None:
         """Return the map to switch to; None if it is in use."""
@@ -214,6 +230,10 @@ class Actions:
         self._maps.enable(known)
         self._report(action.action_id, ActionStatus.FINISHED, f"map {known.name} is enabled")
         in_use = self._maps.in_use
+        if known.grid is None:
+            # Of a site: probably the robot is there, unless the scans say where it is.
+            is_open = not self._localization.has_pose
+            return [MapHint(self._localization.stamp, name.id, _SOURCE)] if is_open else []
         if in_use is None or in_use.name.id != name.id or in_use is known:
             return []
         # Another version of the map in use: go on at the same pose, if the new one explains it.

@@ -16,7 +16,7 @@ import aiomqtt
 from firstfix.core.errors import InputError
 from firstfix.localizer.inputs import Input
 from firstfix.localizer.outputs import Output, TrackedPose
-from firstfix.site.floors import AnyLocalizer
+from firstfix.site.floors import AnyLocalizer, SiteLocalizer
 from firstfix.vda5050.actions import Actions
 from firstfix.vda5050.broker import Broker
 from firstfix.vda5050.encoder import Encoder
@@ -105,14 +105,19 @@ class Bridge:
         """Take over what an input led to; called by the localizer's thread."""
         now = time.monotonic()
         with self._lock:
-            matcher = localizer.matcher
-            in_use = self._maps.in_use
-            if matcher is not None and (in_use is None or in_use.grid is not matcher.fields.grid):
-                self._maps.receive(matcher.fields.grid)
+            self._note_map(localizer)
             self._actions.observe(given, outputs)
             self._localization.observe(given, outputs, now)
             self._has_moved |= any(isinstance(output, TrackedPose) for output in outputs)
         # The bridge is not woken: it would compete with the localizer for the interpreter.
+
+    def _note_map(self, localizer: AnyLocalizer) -> None:
+        in_use, matcher = self._maps.in_use, localizer.matcher
+        if isinstance(localizer, SiteLocalizer):
+            if not self._maps.has_site or self._maps.id_in_use != localizer.map_id:
+                self._maps.receive_site(localizer.site.contents, localizer.map_id)
+        elif matcher is not None and (in_use is None or in_use.grid is not matcher.fields.grid):
+            self._maps.receive(matcher.fields.grid)
 
     # ---- the thread of the bridge
 

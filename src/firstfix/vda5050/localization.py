@@ -48,6 +48,11 @@ class Localization:
         self.stamp = 0.0
 
     @property
+    def has_pose(self) -> bool:
+        """True while a pose is published."""
+        return self._state is State.LOCALIZED
+
+    @property
     def T_map_base(self) -> SE2 | None:
         """The pose, or the last one; None before the first and on a new map."""
         return self._pose

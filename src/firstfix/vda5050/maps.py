@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -35,7 +35,7 @@ class KnownMap:
 
     name: MapName
     key: str
-    grid: OccupancyGrid = field(repr=False)
+    grid: OccupancyGrid | None = field(repr=False)  # None: the localizer has the maps of a site
 
 
 def read_map_name(text: str) -> MapName:
@@ -97,6 +97,7 @@ class MapRegister:
         self._known = list(others)
         self._enabled: set[MapName] = set()
         self.in_use: KnownMap | None = None
+        self.has_site = False
         names = [first, *(known.name for known in others)]
         for name in names:
             if names.count(name) > 1:
@@ -135,6 +136,24 @@ class MapRegister:
                 self._known.insert(0, known)
         self.in_use = known
         self.enable(known)
+
+    def receive_site(self, contents: Mapping[str, str], map_id: str | None) -> None:
+        """Note the maps of a site, all enabled, and the one in use.
+
+        Parameters
+        ----------
+        contents : mapping of str to str
+            Hash of each map, by id.
+        map_id : str or None
+            The map in use; None before the first.
+        """
+        if not self.has_site:
+            self.has_site = True
+            self._known = [
+                KnownMap(MapName(name, key[:_SHORT]), key, None) for name, key in contents.items()
+            ]
+            self._enabled = {known.name for known in self._known}
+        self.in_use = next((known for known in self._known if known.name.id == map_id), None)
 
     def find(self, name: MapName) -> KnownMap | None:
         """Return a map by id and version; None if it is not known."""
