@@ -16,6 +16,7 @@ from firstfix.core.recording import Recording
 from firstfix.core.se2 import SE2
 from firstfix.io.logs.npz import save_recording
 from firstfix.io.maps.map_server import save_map
+from firstfix.site.site import Site
 
 POSE = SE2(3.9, 1.7, 0.6)
 
@@ -62,6 +63,14 @@ def test_a_broken_map_is_named_and_the_others_are_searched(cli, floors: Path) ->
     assert ended.status == 0
     assert "\nground " in ended.out
     assert ended.err.startswith("warning: The map gone cannot be used: ")
+
+
+def test_check_writes_a_description_once(cli, tmp_path: Path) -> None:
+    save_rooms(tmp_path)
+    written = cli("site", "check", tmp_path, "--samples", 0, "--write")
+    assert (written.status, "site: " in written.err) == (0, True), written
+    assert list(Site.load(tmp_path).maps) == sorted(ROOMS)
+    assert cli("site", "check", tmp_path, "--samples", 0, "--write").status == 2
 
 
 def test_check_finds_copies_and_what_looks_alike(cli, floors: Path) -> None:

@@ -91,14 +91,20 @@ def check(
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw which maps look alike.")
     ] = None,
+    write: Annotated[
+        bool, typer.Option("--write", help="Write a site.yaml with all maps, to be filled in.")
+    ] = False,
 ) -> None:
     """Prepare all maps, and tell which are copies or look alike, and what a scan costs.
 
     A simulated sensor takes scans at random places of each map, and each scan is located in the
     whole site.
     """
+    from firstfix.io.maps.site_skeleton import write_site_skeleton
     from firstfix.lab.experiments.site_check import check_site
 
+    if write:
+        typer.echo(f"site: {write_site_skeleton(site_path)}", err=True)
     if plot is not None:
         from firstfix.lab.reports.output_files import check_picture
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from firstfix.core.errors import FirstfixError
 from firstfix.core.se2 import SE2
+from firstfix.io.maps.site_skeleton import write_site_skeleton
 from firstfix.io.maps.site_yaml import read_site
 
 MAP = "image: map.pgm\nresolution: 0.05\n"
@@ -123,3 +124,31 @@ def test_any_bytes_are_read_or_refused(tmp_path: Path, data: bytes) -> None:
         read_site(tmp_path)
     except FirstfixError as error:
         assert str(error)  # noqa: PT017 - the only error there may be
+
+
+def test_a_skeleton_has_all_maps_and_zones_and_leaves_the_lifts_to_a_person(tmp_path: Path) -> None:
+    zones = "zones: {door: [[0, 0], [1, 0], [1, 1]]}"
+    put(
+        tmp_path,
+        {"hall.yaml": MAP, "hall.zones.yaml": zones, "a: b/map.yaml": MAP, "no/1.yaml": MAP},
+    )
+    before = read_site(tmp_path)
+    written = write_site_skeleton(tmp_path)
+    after = read_site(tmp_path)
+    assert written == tmp_path / "site.yaml"
+    assert [(m.id, m.path) for m in after.maps] == [(m.id, m.path) for m in before.maps]
+    assert {m.id: m.zones for m in after.maps if m.zones} == {
+        "hall": {"door": ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))}
+    }
+    # What a person fills in can be read.
+    filled = written.read_text().replace("# transitions:", "transitions:")
+    written.write_text(filled.replace("#   lift:", "  lift:"))
+    (lift,) = read_site(tmp_path).transitions
+    assert [end.map_id for end in lift.ends] == [before.maps[0].id, before.maps[-1].id]
+
+
+@pytest.mark.parametrize("given", [".", "site.yaml"])
+def test_a_skeleton_replaces_nothing(tmp_path: Path, given: str) -> None:
+    put(tmp_path, {"hall.yaml": MAP, "site.yaml": "maps: {hall: hall.yaml}"})
+    with pytest.raises(FirstfixError, match=r"has a site\.yaml already"):
+        write_site_skeleton(tmp_path / given)
