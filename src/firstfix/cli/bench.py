@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -50,12 +53,13 @@ _OPTIONS = {
     "--track": {*_CASES, "--params", "--seed", "--jobs"},
     "--kidnap": {*_CASES, "--worlds", "--scenarios", "--seed", "--jobs", "--report"},
     "--starts": {*_CASES, "--runs", "--seed", "--jobs", "--report"},
-    "--site": {"--floors", "--limit"},
+    "--site": {"--floors", "--limit", "--maps", "--jobs"},
+    "--rides": {"--seed", "--maps", "--jobs"},
     "--suite paper": {"--worlds", "--runs", "--seed", "--jobs", "--report"},
     "--suite scaling": {"--seed", "--report"},
     "--suite ablation": {"CASES", "--limit", "--sensor", "--jobs", "--report"},
 }
-_WITHOUT_CASES = {"--kidnap", "--suite paper", "--suite scaling"}
+_WITHOUT_CASES = {"--kidnap", "--rides", "--suite paper", "--suite scaling"}
 
 
 def bench(
@@ -162,6 +166,27 @@ def bench(
             rich_help_panel=STARTING,
         ),
     ] = False,
+    rides: Annotated[
+        int | None,
+        typer.Option(
+            "--rides",
+            min=1,
+            help="Ride the lift of a drawn building of 10 floors so often instead; count poses on "
+            "wrong floors, and how soon the right one is found.",
+            show_default=False,
+            rich_help_panel=STARTING,
+        ),
+    ] = None,
+    maps: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Keep the maps of --site or --rides, and what is prepared of them, in this "
+            "folder: another run uses them, and one that was stopped goes on.",
+            show_default="a folder that is removed",
+            rich_help_panel=STARTING,
+        ),
+    ] = None,
     kidnapped: Annotated[
         bool,
         typer.Option(
@@ -239,8 +264,10 @@ def bench(
         "--scenarios": scenarios,
         "--worlds": worlds,
         "--runs": runs,
+        "--maps": maps,
     }
     asked = {"--track": tracked, "--starts": starts, "--kidnap": kidnapped, "--site": site}
+    asked["--rides"] = rides is not None
     if suite is not None:
         asked[f"--suite {suite.value}"] = True
     measure = _check_options([name for name, is_asked in asked.items() if is_asked], given)
@@ -255,9 +282,14 @@ def bench(
     from firstfix.lab.worlds.catalog import WORLDS, parse_worlds
 
     sensors = list(dict.fromkeys(parse_sensor(text) for text in sensor or ["recorded"]))
-    if measure == "--site":
-        benchmark = benchmarks.site_benchmark(parse_floors(floors), limit or QUERIES)
-        _run(benchmark, 1, Printed.JSON if as_object else Printed.TABLES, out, report)
+    if measure in ("--site", "--rides"):
+        with _kept_or_temporary(maps) as folder:
+            benchmark = (
+                benchmarks.rides_benchmark(folder, seed or 0, rides)
+                if rides is not None
+                else benchmarks.site_benchmark(folder, parse_floors(floors), limit or QUERIES)
+            )
+            _run(benchmark, jobs, Printed.JSON if as_object else Printed.TABLES, out, report)
         return
     drawn = [floor_case(number) for number in parse_floors(floors)]
     found: list[Case] = benchmarks.cut_to_sensors([*find_cases(folders), *drawn], sensors)
@@ -287,6 +319,19 @@ def bench(
         methods = _methods(method or [], estimates or [], on_wrong_maps=wrong_map)
         benchmark = benchmarks.locate_benchmark(found, methods, limit, with_wrong_maps=wrong_map)
     _run(benchmark, jobs, Printed.JSON if as_object else Printed.TABLES, out, report)
+
+
+@contextmanager
+def _kept_or_temporary(folder: Path | None) -> Iterator[Path]:
+    """Give a folder: one that is kept, or a new one that is removed."""
+    from firstfix.lab.reports.output_files import make_folder
+
+    if folder is not None:
+        make_folder(folder)
+        yield folder
+        return
+    with tempfile.TemporaryDirectory(prefix="firstfix-site-") as temporary:
+        yield Path(temporary)
 
 
 def _methods(names: list[str], estimates: list[Path], *, on_wrong_maps: bool) -> list[BenchMethod]:
@@ -324,7 +369,7 @@ def _check_options(asked: list[str], given: dict[str, Any]) -> str:
         raise InputError(
             expected="CASES: at least one folder of a case, or of cases; or --floors",
             received="none",
-            remedy="name one; only --kidnap and --suite paper or scaling can do without",
+            remedy="name one; only --kidnap, --rides and --suite paper or scaling can do without",
         )
     return measure
 

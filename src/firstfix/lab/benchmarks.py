@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from firstfix.amcl.config import AmclConfig
@@ -21,18 +22,14 @@ from firstfix.lab.experiments.locate_bench import (
     wrong_map_tasks,
 )
 from firstfix.lab.experiments.paper_bench import DRIVE_S, PaperResult, PaperTask
+from firstfix.lab.experiments.rides_bench import ride_tasks, rides_document, rides_table
 from firstfix.lab.experiments.scaling import (
     cost_table,
     scaling_document,
     scaling_tasks,
     threads_table,
 )
-from firstfix.lab.experiments.site_bench import (
-    SiteFigures,
-    SiteTask,
-    site_document,
-    site_table,
-)
+from firstfix.lab.experiments.site_bench import site_document, site_table, site_tasks
 from firstfix.lab.experiments.start_bench import StartResult, StartTask
 from firstfix.lab.experiments.track_bench import TrackRun, TrackTask, track_document, track_table
 from firstfix.lab.reports import start_report
@@ -220,19 +217,54 @@ def scaling_benchmark(seed: int) -> Benchmark:
     return Benchmark(tasks, names, summarize)
 
 
-def site_benchmark(seeds: Sequence[int], queries: int) -> Benchmark:
-    """Ask a site of random floors in which map, and where in it, scans were taken."""
+def site_benchmark(folder: Path, seeds: Sequence[int], queries: int) -> Benchmark:
+    """Ask a site of random floors in which map, and where in it, scans were taken.
 
-    def summarize(results: list[SiteFigures]) -> Summary:
-        document = site_document(results[0])
+    Parameters
+    ----------
+    folder : Path
+        For the maps; what is there already is used.
+    seeds : sequence of int
+        Of the floors.
+    queries : int
+        Number of scans.
+    """
+    prepare, ask = site_tasks(folder, seeds, queries)
+
+    def summarize(results: list[Any]) -> Summary:
+        document = site_document(results[: len(prepare)], results[len(prepare) :])
         far = document["extrapolated"]
         note = (
-            f"extrapolated, not measured: {far['floors']} floors take {far['cpu_s']:.1f} s of "
+            f"extrapolated, not measured: {far['area_m2']:,.0f} m² take {far['cpu_s']:.1f} s of "
             f"processor time, {far['wall_s_16_cores']:.2f} s on 16 cores"
         )
         return Summary(document, (site_table(document),), (note,))
 
-    return Benchmark([SiteTask(tuple(seeds), queries)], [f"{len(seeds)} floors"], summarize)
+    names = [f"floors up to {task.seeds[-1]}" for task in prepare]
+    names += [f"scans up to {task.scans[-1] + 1}" for task in ask]
+    return Benchmark([*prepare, *ask], names, summarize, first=len(prepare))
+
+
+def rides_benchmark(folder: Path, seed: int, rides: int) -> Benchmark:
+    """Ride the lift of a drawn building, and count poses on wrong floors.
+
+    Parameters
+    ----------
+    folder : Path
+        For the maps; what is there already is used.
+    seed : int
+        Of the building and the robots.
+    rides : int
+        Number of rides.
+    """
+    build, ride = ride_tasks(folder, seed, rides)
+
+    def summarize(results: list[Any]) -> Summary:
+        document = rides_document(seed, [one for of_robot in results[1:] for one in of_robot])
+        return Summary(document, (rides_table(document),))
+
+    names = ["the building", *(f"robot {task.robot + 1}" for task in ride)]
+    return Benchmark([*build, *ride], names, summarize, first=len(build))
 
 
 def ablation_benchmark(cases: Sequence[Case], limit: int) -> Benchmark:

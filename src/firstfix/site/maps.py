@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from threading import Lock
 
@@ -32,13 +33,16 @@ class PreparedMap:
         What the files of the site say of it.
     fields : MapFields
         The map.
-    content : str
-        Hash of cells, resolution and origin: maps that are copies have the same.
     """
 
     entry: SiteMap
     fields: MapFields
-    content: str
+
+    @cached_property
+    def content(self) -> str:
+        """Hash of cells, resolution and origin: maps that are copies have the same."""
+        grid = self.fields.grid
+        return cache.content_key(grid.cells, repr((grid.resolution, *grid.T_map_grid)))
 
 
 Maps = Callable[[str], PreparedMap]
@@ -130,9 +134,7 @@ def prepared(entry: SiteMap, cache_dir: Path | None) -> PreparedMap:
     # The tables of the exhaustive search would take most of the memory of a site.
     fields = MapFields(grid, cache_dir, key, cache_limit=None, most_positions=0)
     check_positions(fields)
-    return PreparedMap(
-        entry, fields, cache.content_key(grid.cells, repr((grid.resolution, *grid.T_map_grid)))
-    )
+    return PreparedMap(entry, fields)
 
 
 def _bytes_of(path: Path) -> NDArray[np.uint8]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from firstfix.io.maps.site_yaml import read_site
-from firstfix.lab.worlds.towers import LIFT, TowerFloor, tower, write_tower
+from firstfix.lab.worlds.towers import LIFT, Likeness, TowerFloor, tower, write_tower
 
 
 @pytest.fixture(scope="module")
@@ -18,6 +18,14 @@ def test_the_first_two_floors_differ_in_furniture_only(floors):
     one, two, other = (floor.map for floor in floors)
     assert 0.0 < np.mean(one.cells != two.cells) < 0.05
     assert other.cells.shape != one.cells.shape or np.mean(other.cells != one.cells) > 0.05
+
+
+def test_alike_floors_have_the_walls_of_each_other_and_a_lift_at_one_place():
+    _, _, one, two = tower(1, 4, 400.0)
+    assert one.likeness is two.likeness is Likeness.ALIKE
+    assert one.T_map_lift == two.T_map_lift
+    assert one.plan.plan() == two.plan.plan()
+    assert 0.01 < np.mean(one.map.cells != two.map.cells) < 0.2
 
 
 @pytest.mark.parametrize("level", [0, 2])

@@ -44,11 +44,14 @@ class Benchmark:
         One for each task, to show progress.
     summarize : callable
         Takes the results in the order of the tasks.
+    first : int
+        Number of tasks that have to end before the others begin.
     """
 
     tasks: Sequence[Callable[[], Any]]
     names: Sequence[str]
     summarize: Callable[[list[Any]], Summary]
+    first: int = 0
 
     def run(self, jobs: int, on_done: Callable[[str], None]) -> Summary:
         """Run the tasks, ``jobs`` at a time; ``on_done`` takes the name of each that has ended.
@@ -58,6 +61,10 @@ class Benchmark:
         InputError
             If a task fails because of its input, or nothing could be measured.
         """
-        return self.summarize(
-            run_in_processes(self.tasks, jobs, lambda i, _: on_done(self.names[i]))
+        before = run_in_processes(
+            self.tasks[: self.first], jobs, lambda i, _: on_done(self.names[i])
         )
+        rest = run_in_processes(
+            self.tasks[self.first :], jobs, lambda i, _: on_done(self.names[self.first + i])
+        )
+        return self.summarize([*before, *rest])

@@ -20,7 +20,7 @@ from firstfix.lab.simulation.pilot import Pilot
 from firstfix.lab.simulation.planner import Planner
 from firstfix.lab.simulation.robot import Kobuki, Robot
 from firstfix.lab.simulation.wheels import WheelErrors
-from firstfix.lab.worlds.towers import EXIT_M, TowerFloor
+from firstfix.lab.worlds.towers import EXIT_M, Likeness, TowerFloor
 from firstfix.localizer.inputs import Input, MapHint
 from firstfix.localizer.outputs import InitialPose, MapSwitched, TrackedPose
 from firstfix.site.floors import SiteLocalizer
@@ -39,6 +39,9 @@ class Teller(Enum):
     NOBODY = "nobody"
     LIFT = "the lift"
 
+
+# Who tells a robot its floor that was not found on a ride, and how long it stands then, s.
+_PERSON, _TOLD_S = "a person", 2.0
 
 _PERIOD_S = 0.2
 _TICKS = 5  # of odometry in a period
@@ -60,6 +63,8 @@ class Ride:
     ----------
     start, goal : int
         Levels.
+    likeness : Likeness
+        Of the goal.
     poses, wrong_map, wrong_place : int
         Poses that were published; those in another map than that of the floor; those in the right
         map, too far from the truth.
@@ -72,6 +77,7 @@ class Ride:
 
     start: int
     goal: int
+    likeness: Likeness
     poses: int
     wrong_map: int
     wrong_place: int
@@ -118,9 +124,9 @@ class _Robot:
         """Plans on the floor where the robot is."""
         return self._planners.setdefault(id(self._world), Planner(self._world, 0.22))
 
-    def hear(self, map_id: str) -> None:
-        """Be told the floor by the lift."""
-        self._give(MapHint(self._now, map_id, Teller.LIFT.value))
+    def hear(self, map_id: str, teller: str) -> None:
+        """Be told the floor."""
+        self._give(MapHint(self._now, map_id, teller))
 
     def stand(self, seconds: float) -> Iterator[float]:
         """Stand; yield the way of each period, 0 m."""
@@ -165,11 +171,14 @@ def ride_lifts(
     floors: Sequence[TowerFloor],
     folder: Path,
     rides: int,
-    seed: int,
+    seed: int | Sequence[int],
     cache_dir: Path,
     teller: Teller = Teller.NOBODY,
 ) -> Iterator[Ride]:
     """Let one robot ride a lift again and again.
+
+    It begins on a floor that is like no other. A robot that was not found by the end of a ride is
+    told its floor by a person, so that the next ride begins with a robot that knows its place.
 
     Parameters
     ----------
@@ -179,7 +188,7 @@ def ride_lifts(
         Its site, as `write_tower` writes it.
     rides : int
         Number of rides.
-    seed : int
+    seed : int or sequence of int
         Of the robot, and of the floors that it rides to.
     cache_dir : Path
         Folder of prepared maps.
@@ -192,8 +201,9 @@ def ride_lifts(
         One after the other.
     """
     rng = np.random.default_rng(seed)
+    distinct = [i for i, one in enumerate(floors) if one.likeness is Likeness.DISTINCT]
+    level = int(rng.choice(distinct or range(len(floors))))
     robot = _Robot(SiteLocalizer(Site.load(folder, cache_dir), cache_dir=cache_dir), rng)
-    level = int(rng.integers(len(floors)))
     lift = floors[level].T_map_lift
     robot.enter(floors[level], floors[level].open_world, lift @ SE2(EXIT_M, 0.0, 0.0))
     for _ in robot.stand(2.0):
@@ -202,6 +212,10 @@ def ride_lifts(
         goal = int((level + 1 + rng.integers(len(floors) - 1)) % len(floors))
         yield _ride(robot, floors[level], floors[goal], teller, rng)
         level = goal
+        if not robot.is_right:
+            robot.hear(floors[level].map_id, _PERSON)
+            for _ in robot.stand(_TOLD_S):
+                pass
 
 
 def _ride(
@@ -220,7 +234,7 @@ def _ride(
         pass
     robot.enter(goal, goal.open_world, robot.T_map_base)
     if teller is Teller.LIFT:
-        robot.hear(goal.map_id)
+        robot.hear(goal.map_id, teller.value)
     robot.is_right = False
     found_s = found_m = math.inf
     seconds = way = 0.0
@@ -231,6 +245,7 @@ def _ride(
     return Ride(
         start.level,
         goal.level,
+        goal.likeness,
         robot.poses,
         robot.wrong_map,
         robot.wrong_place,
@@ -255,22 +270,3 @@ def _near(robot: _Robot, out: SE2, rng: np.random.Generator) -> tuple[float, flo
         if 1.0 <= place.distance_to(out) <= _LEFT_M:
             return place.x, place.y
     return out.x, out.y
-
-
-def in_words(rides: Sequence[Ride]) -> str:
-    """Sum rides up in three lines."""
-    found = [ride for ride in rides if ride.is_found]
-    seconds = np.array([ride.found_s for ride in rides])
-    metres = np.array([ride.found_m for ride in rides])
-    poses = sum(ride.poses for ride in rides)
-    wrong = sum(ride.wrong_map for ride in rides)
-    on_wrong = sum(ride.wrong_map > 0 for ride in rides)
-    cpu = float(np.mean([ride.cpu_s for ride in rides]))
-    return (
-        f"{len(rides)} rides, {poses} poses: {wrong} on a wrong map (in {on_wrong} rides), "
-        f"{sum(ride.wrong_place for ride in rides)} more than {RIGHT_M} m off\n"
-        f"{len(found) / len(rides):.1%} found within {FOUND_M:.0f} m or {FOUND_S:.0f} s of the "
-        f"opening of the door; {np.isfinite(seconds).mean():.1%} before the end of the drive\n"
-        f"median {np.median(seconds):.1f} s and {np.median(metres):.2f} m; "
-        f"{cpu:.1f} s of CPU a ride"
-    )

@@ -46,6 +46,9 @@ class RandomFloor:
         At least 0. Different seeds give different floors.
     area_m2 : float or None
         Area within the outer walls, m²; None draws it from `AREA_M2`.
+    furnished : int
+        Floors of one seed have the same walls. Each number gives other furniture, rooms that were
+        locked, and changes since.
 
     Raises
     ------
@@ -55,6 +58,7 @@ class RandomFloor:
 
     seed: int
     area_m2: float | None = None
+    furnished: int = 0
 
     def __post_init__(self) -> None:
         if self.seed < 0 or (self.area_m2 is not None and not self.area_m2 >= 100.0):
@@ -101,6 +105,8 @@ class RandomFloor:
         return self._turned(_drawn(changed, pieces, lambda piece: piece.in_world))
 
     def _rng(self, stream: int) -> np.random.Generator:
+        if self.furnished and stream in (_FURNITURE, _CHANGES):
+            return np.random.default_rng([self.seed, stream, self.furnished])
         return np.random.default_rng([self.seed, stream])
 
     def _turned(self, cells: NDArray[np.int8]) -> OccupancyGrid:

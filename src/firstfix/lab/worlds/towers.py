@@ -1,9 +1,10 @@
-"""A building with one lift: floors by seed, of which some are nearly alike, as a site."""
+"""A building with one lift: floors by seed, of which some are alike, as a site."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import Enum
 from functools import cached_property
 from pathlib import Path
 
@@ -35,6 +36,14 @@ _PIECE_CELLS = (8, 24)
 _MOVED = 0.2
 
 
+class Likeness(Enum):
+    """How a floor is like another one of its building."""
+
+    DISTINCT = "distinct"
+    ALIKE = "alike"
+    TWIN = "twin"
+
+
 @dataclass(frozen=True)
 class TowerFloor:
     """One floor of a tower.
@@ -45,10 +54,14 @@ class TowerFloor:
         What it is drawn from.
     level : int
         Number of the floor. Floors with one plan differ in some furniture.
+    likeness : Likeness
+        An alike floor has the walls of another one and furniture of its own, as floors of real
+        buildings; a twin has that furniture, too, except for some pieces.
     """
 
     plan: RandomFloor
     level: int
+    likeness: Likeness = Likeness.DISTINCT
 
     @property
     def map_id(self) -> str:
@@ -58,7 +71,7 @@ class TowerFloor:
     @cached_property
     def map(self) -> OccupancyGrid:
         """The floor as it was mapped, with the door of the lift open."""
-        return self._with_lift(self.plan.map(), shown_from=0.0, is_open=True)
+        return self._with_lift(self._plan_map, shown_from=0.0, is_open=True)
 
     @cached_property
     def open_world(self) -> OccupancyGrid:
@@ -73,14 +86,18 @@ class TowerFloor:
     @cached_property
     def T_map_lift(self) -> SE2:
         """Pose of a robot in the middle of the cabin that looks out of the door."""
-        grid = self.plan.map()
+        grid = self._plan_map
         row, column, yaw = self._place
         x, y = grid.to_map(np.array([column + 0.5, row + 0.5]))
         return SE2(float(x), float(y), yaw)
 
     @property
     def _size(self) -> int:
-        return round(_CABIN_M / self.plan.map().resolution / 2)
+        return round(_CABIN_M / self._plan_map.resolution / 2)
+
+    @cached_property
+    def _plan_map(self) -> OccupancyGrid:
+        return self.plan.map()
 
     @cached_property
     def _place(self) -> tuple[int, int, float]:
@@ -91,7 +108,9 @@ class TowerFloor:
         InputError
             If no room of the floor is large enough.
         """
-        grid, world = self.plan.map(), self.plan.world()
+        # The lift stands at one place on all floors with these walls.
+        first = replace(self.plan, furnished=0)
+        grid, world = first.map(), first.world()
         free = (grid.cells == FREE) & (world.cells == FREE)
         room = euclidean_distance(np.pad(~free, 1, constant_values=True))[1:-1, 1:-1]
         fits = np.argwhere(room * grid.resolution >= _ROOM_M)
@@ -108,6 +127,11 @@ class TowerFloor:
         self._furnish(cells, shown_from)
         row, column, yaw = self._place
         half, wall = self._size, _WALL_CELLS
+        # No furniture before the lift.
+        lobby = round(_ROOM_M / grid.resolution)
+        y, x = np.ogrid[-lobby : lobby + 1, -lobby : lobby + 1]
+        around = cells[row - lobby : row + lobby + 1, column - lobby : column + lobby + 1]
+        around[y**2 + x**2 < lobby**2] = FREE
         outer = (
             slice(row - half - wall, row + half + wall),
             slice(column - half - wall, column + half + wall),
@@ -123,7 +147,7 @@ class TowerFloor:
     def _furnish(self, cells: NDArray[np.int8], shown_from: float) -> None:
         """Add the pieces of this level in free space, apart from the lift."""
         rng = np.random.default_rng([self.plan.seed, 20 + self.level])
-        free = np.argwhere(self.plan.map().cells == FREE)
+        free = np.argwhere(self._plan_map.cells == FREE)
         row, column, _ = self._place
         for _ in range(int(rng.integers(*_PIECES))):
             y, x = free[int(rng.integers(len(free)))].tolist()
@@ -134,7 +158,7 @@ class TowerFloor:
 
 
 def tower(seed: int, levels: int, area_m2: float) -> list[TowerFloor]:
-    """Draw a building: the first four floors are two pairs of twins, all others differ.
+    """Draw a building: floors 0 and 1 are twins, 2 and 3 are alike, all others differ.
 
     Parameters
     ----------
@@ -155,7 +179,13 @@ def tower(seed: int, levels: int, area_m2: float) -> list[TowerFloor]:
         except InputError:
             continue
         plans.append(plan)
-    return [TowerFloor(plans[level // 2 if level < 4 else level], level) for level in range(levels)]
+    return [_floor_at(level, plans[level // 2 if level < 4 else level]) for level in range(levels)]
+
+
+def _floor_at(level: int, plan: RandomFloor) -> TowerFloor:
+    if level in (2, 3):
+        return TowerFloor(replace(plan, furnished=level), level, Likeness.ALIKE)
+    return TowerFloor(plan, level, Likeness.TWIN if level < 2 else Likeness.DISTINCT)
 
 
 def write_tower(folder: Path, floors: list[TowerFloor]) -> Path:
