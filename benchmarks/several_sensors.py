@@ -1,11 +1,13 @@
 """The localizer with a depth camera that turns, two lasers at 40 Hz, and scans that are skewed.
 
     python benchmarks/several_sensors.py turn --buildings office floor:3 --places 20
+    python benchmarks/several_sensors.py turn --cases ../shared/cases/fr079
     python benchmarks/several_sensors.py rate
     python benchmarks/several_sensors.py skew
 
 `turn`: how often a depth camera, 60 degrees x 5 m, is found within one turn in place, and how often
-at a wrong place. `rate`: processor time of two lasers of 270 degrees at 40 Hz, as a share of one
+at a wrong place; with --cases, where the robot of a recorded drive turns 180 degrees within 3 m.
+`rate`: processor time of two lasers of 270 degrees at 40 Hz, as a share of one
 core, and the 99th percentile from scan to pose. `skew`: median error of the tracked pose.
 """
 
@@ -14,15 +16,21 @@ from __future__ import annotations
 import argparse
 import math
 import time
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Odometry
+from firstfix.core.recording import Recording
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
+from firstfix.core.trajectory import Trajectory
 from firstfix.global_localization.places import is_same_place
+from firstfix.lab.experiments.case import Case, SensorCut, find_cases, truth_at
 from firstfix.lab.simulation.floor import Floor
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.simulation.rigs import RIGS
@@ -35,6 +43,8 @@ from firstfix.localizer.outputs import InitialPose, TrackedPose
 
 HZ = 10.0
 TURN_RAD_S = math.radians(45.0)
+# Robots seldom turn in place: half a turn within this way.
+REAL_TURN_RAD, REAL_WAY_M = math.radians(180.0), 3.0
 # Wheels turn this much more than the robot.
 ODOMETRY_TURN = 1.02
 
@@ -44,7 +54,12 @@ def main() -> None:
     parser.add_argument("what", choices=("turn", "rate", "skew"))
     parser.add_argument("--buildings", nargs="+", default=["office"])
     parser.add_argument("--places", type=int, default=20)
+    parser.add_argument("--cases", nargs="*", type=Path, default=[])
     arguments = parser.parse_args()
+    if arguments.cases:
+        for case in find_cases(arguments.cases):
+            print(case.name, recorded_turns(case), flush=True)
+        return
     for name in arguments.buildings:
         grid = world_or_map(name)
         if arguments.what == "turn":
@@ -76,6 +91,53 @@ def turning(grid: OccupancyGrid, places: int) -> str:
                 found, wrong = found + is_right, wrong + (not is_right)
                 break
     return f"found {found}, wrong {wrong}, open {places - found - wrong} of {places}"
+
+
+def recorded_turns(case: Case) -> str:
+    """Let a depth camera start where the robot of a drive begins to turn."""
+    recording, grid = case.seen_by(SensorCut(math.radians(60.0), 5.0)).recording(), case.grid()
+    if recording.odometry is None:
+        return "no odometry"
+    ends: Counter[str] = Counter()
+    for first, last in turns(recording, recording.odometry):
+        localizer, end = Localizer(), "open"
+        localizer.handle(NewMap(recording.scans[first].stamp, grid))
+        for i in range(first, last + 1):
+            scan = recording.scans[i]
+            pose = recording.odometry.at(scan.stamp)
+            before = [] if pose is None else localizer.handle(Odometry(scan.stamp, pose))
+            outputs = before + localizer.handle(scan)
+            found = next((o for o in outputs if isinstance(o, InitialPose)), None)
+            truth = truth_at(recording, i)
+            if found is not None and truth is not None:
+                end = "right" if is_same_place(found.T_map_base, truth) else "wrong"
+                break
+        ends[end] += 1
+    return f"found {ends['right']}, wrong {ends['wrong']}, open {ends['open']} of {ends.total()}"
+
+
+def turns(recording: Recording, odometry: Trajectory) -> Iterator[tuple[int, int]]:
+    """Yield the first and the last scan of each turn, one after another."""
+    poses = [odometry.at(scan.stamp) for scan in recording.scans]
+    first = 0
+    while first < len(poses) - 1:
+        turned = way = 0.0
+        last = first
+        while last + 1 < len(poses) and abs(turned) < REAL_TURN_RAD and way < REAL_WAY_M:
+            a, b = poses[last], poses[last + 1]
+            if a is None or b is None or not is_one_run(recording, first, last + 1):
+                break
+            turned, way = turned + (a.inverse() @ b).yaw, way + a.distance_to(b)
+            last += 1
+        if abs(turned) >= REAL_TURN_RAD:
+            yield first, last
+            first = last
+        else:
+            first += 1
+
+
+def is_one_run(recording: Recording, a: int, b: int) -> bool:
+    return recording.runs is None or bool(recording.runs[a] == recording.runs[b])
 
 
 def two_lasers(grid: OccupancyGrid, seconds: float = 20.0) -> str:

@@ -85,6 +85,8 @@ def test_a_prior_holds_for_the_time_it_was_given(halls, drive):
         (lambda: Near(SE2(0.0, 0.0, 0.0), math.nan), "radius"),
         (lambda: Near(SE2(0.0, 0.0, 0.0), 1.0, angle=0.0), "angle"),
         (lambda: Region([(0.0, 0.0), (1.0, 1.0)]), "three corners"),
+        (lambda: Region("hall"), "received 'hall'"),
+        (lambda: Region(None), "received None"),
         (lambda: Region([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)]), "one line"),
         (lambda: Region([(0.0, 0.0), (1.0, 1.0), (math.nan, 2.0)]), "NaN"),
     ],

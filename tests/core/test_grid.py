@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from firstfix.core import grid as grid_module
-from firstfix.core.errors import MapError
+from firstfix.core.errors import InputError, MapError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 
@@ -129,3 +129,15 @@ def test_a_layer_marks_walls_that_are_gone_and_things_that_are_new() -> None:
 def test_changes_of_another_map_are_refused(layer: OccupancyGrid) -> None:
     with pytest.raises(MapError, match="another map"):
         OccupancyGrid(CELLS, 0.5).with_changes(layer)
+
+
+@pytest.mark.parametrize("layer", [None, "changes.yaml"])
+def test_a_layer_is_a_map(layer: object) -> None:
+    with pytest.raises(InputError, match="OccupancyGrid"):
+        OccupancyGrid(CELLS, 0.05).with_changes(layer)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["unseen", "changed"])
+def test_a_mask_of_another_kind_is_refused(name: str) -> None:
+    with pytest.raises(MapError, match=f"expected {name} as bool of the shape"):
+        OccupancyGrid(CELLS, 0.05, **{name: [1, 2]})  # type: ignore[arg-type]

@@ -125,7 +125,9 @@ def test_unknown_depth_is_no_point():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: scan_from_points(np.zeros((3, 2)), LEVEL), r"shape \(n, 3\), not \(3, 2\)"),
+        (lambda: scan_from_points(np.zeros((3, 2)), LEVEL), r"\(n, 3\), not float64 of \(3, 2\)"),
+        (lambda: scan_from_points([["x", "y", "z"]], LEVEL), "Points are numbers"),
+        (lambda: points_from_depth([["far"]], (1, 1), (0, 0)), "depth image of <U3"),
         (lambda: scan_from_points(np.zeros(3), LEVEL), r"shape \(n, 3\)"),
         (lambda: scan_from_points(np.zeros((1, 3)), (0, 0, 0)), "no pose in space"),
         (lambda: scan_from_points(np.zeros((1, 3)), np.diag([1, 1, -1, 1])), "no pose in space"),
@@ -133,7 +135,7 @@ def test_unknown_depth_is_no_point():
         (lambda: scan_from_points(np.zeros((1, 3)), LEVEL, (2.0, 1.0)), "The band 2.0 to 1.0 m"),
         (lambda: scan_from_points(np.zeros((1, 3)), LEVEL, view=(0.0, 7.0)), "at most a full turn"),
         (lambda: scan_from_points(np.zeros((1, 3)), LEVEL, step=0.0), "is no scan"),
-        (lambda: points_from_depth(np.zeros(3), (1, 1), (0, 0)), "depth image of shape"),
+        (lambda: points_from_depth(np.zeros(3), (1, 1), (0, 0)), "depth image of float64 of shape"),
         (lambda: points_from_depth(np.zeros((2, 2)), (0, 1), (0, 0)), "focal lengths"),
     ],
 )

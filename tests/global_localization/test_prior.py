@@ -101,6 +101,11 @@ def test_a_place_near_the_prior_competes_with_all_that_the_search_ranks_as_high(
     assert len(nothing.chosen(poses + np.array([0.0, 0.0, 3.0]), 10)) == 10
 
 
+def test_what_is_no_prior_is_refused(rooms, seen):
+    with pytest.raises(InputError, match=r"is no prior\. Pass ff\.Near"):
+        rooms.locate(seen[0], prior=(1.0, 2.0, 0.0))
+
+
 def test_a_prior_multiplies_likelihoods():
     scores, logs = np.array([0.1, 0.5, 1.0, 2.0]), np.array([0.0, -0.5, -3.0, -6.9])
     for beams in (12, 30, 500):

@@ -27,7 +27,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS
 from firstfix.global_localization.places import distinct_places
-from firstfix.global_localization.prior import Prior
+from firstfix.global_localization.prior import Prior, check_prior
 from firstfix.global_localization.verdict import place_probabilities
 
 # A view brings news where the robot has moved or turned by this much.
@@ -203,7 +203,7 @@ def with_prior(
     InputError
         If the prior does not fit the map.
     """
-    prior.check(belief.fields.grid)
+    check_prior(prior, belief.fields.grid)
     anchor = None if T_odom_base is None else in_cells(T_odom_base, belief.fields.grid.resolution)
     return replace(belief, hints=(*belief.hints, Hint(prior, anchor, source)))
 

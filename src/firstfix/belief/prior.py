@@ -177,9 +177,12 @@ class Region:
     _corners: NDArray[np.float64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        corners = np.array(self.polygon, np.float64)
+        try:
+            corners = np.array(self.polygon, np.float64)
+        except (TypeError, ValueError):
+            corners = np.empty(0)
         if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:
-            received = f"{len(self.polygon)} of them"
+            received = f"{self.polygon!r:.60}"
         elif not np.isfinite(corners).all():
             received = "NaN or infinity among them"
         elif abs(_area(corners)) < 1e-9:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.angles import angle_error
-from firstfix.core.arguments import as_pose
+from firstfix.core.arguments import as_instance, as_pose
 from firstfix.core.errors import MapError
 from firstfix.core.se2 import SE2
 
@@ -107,13 +107,14 @@ class OccupancyGrid:
             mask = getattr(self, name)
             if mask is None:
                 continue
-            if mask.shape != cells.shape or mask.dtype != np.bool_:
+            given = np.asarray(mask)
+            if given.shape != cells.shape or given.dtype != np.bool_:
                 raise MapError(
                     expected=f"{name} as bool of the shape of the cells, {cells.shape}",
-                    received=f"{mask.dtype} of shape {mask.shape}",
+                    received=f"{given.dtype} of shape {given.shape}",
                     remedy="leave it out if it is not known",
                 )
-            object.__setattr__(self, name, _read_only(mask.copy()))
+            object.__setattr__(self, name, _read_only(given.copy()))
 
     @property
     def height(self) -> int:
@@ -169,6 +170,7 @@ class OccupancyGrid:
         >>> int(grid.with_changes(ff.OccupancyGrid(cells, grid.resolution)).changed.sum())
         16
         """
+        as_instance(OccupancyGrid, layer, "layer")
         near = 0.01 * self.resolution
         is_same_place = self.T_map_grid.distance_to(layer.T_map_grid) <= near
         if not (

@@ -75,7 +75,10 @@ def scan_from_points(
     """
     xyz = np.asarray(points)
     if xyz.ndim < 2 or xyz.shape[-1] != 3 or xyz.dtype.kind not in "fiu":
-        raise ScanError(f"Points have the shape (n, 3), not {xyz.shape}. Pass x, y, z in metres.")
+        raise ScanError(
+            f"Points are numbers of shape (n, 3), not {xyz.dtype} of {xyz.shape}. Pass x, y, z in "
+            "metres."
+        )
     T = pose_matrix(T_base_sensor)
     low, high = band
     if not low < high:
@@ -127,11 +130,12 @@ def points_from_depth(
     >>> ff.points_from_depth([[2.0, 0.0]], focal=(100.0, 100.0), centre=(0.0, 0.0))[0, 0]
     array([0., 0., 2.], dtype=float32)
     """
-    z = np.array(depth, np.float32)
+    given = np.asarray(depth)
+    z = np.array(given if given.dtype.kind in "fiu" else [], np.float32)
     if z.ndim != 2 or not (focal[0] > 0.0 and focal[1] > 0.0):
         raise ScanError(
-            f"A depth image of shape {z.shape} with focal lengths {focal} cannot be used. Pass "
-            "height x width distances, and the camera's fx, fy in pixels."
+            f"A depth image of {given.dtype} of shape {given.shape} with focal lengths {focal} "
+            "cannot be used. Pass height x width distances, and the camera's fx, fy in pixels."
         )
     z[~(z > 0.0)] = np.nan
     rows, columns = (np.arange(n, dtype=np.float32) for n in z.shape)

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.global_localization.frames import bases_in_map
@@ -40,6 +41,22 @@ class Prior(Protocol):
 
     def check(self, grid: OccupancyGrid) -> None:
         """Raise InputError if no robot of this map can be there."""
+
+
+def check_prior(prior: Prior, grid: OccupancyGrid) -> None:
+    """Refuse what is no prior, or one in which no robot of this map can be.
+
+    Raises
+    ------
+    InputError
+        If it is either.
+    """
+    if not callable(getattr(prior, "log_likelihood", None)):
+        raise InputError(
+            f"{prior!r:.60} is no prior. Pass ff.Near(pose, radius), ff.Region(polygon), or one of "
+            "your own with log_likelihood and check."
+        )
+    prior.check(grid)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -27,6 +27,7 @@ from firstfix.global_localization.prior import (
     SHARE_WITHOUT_PRIOR,
     PlacePrior,
     Prior,
+    check_prior,
 )
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.scoring import score_poses, search_locally
@@ -149,7 +150,7 @@ class ScanMatcher:
         """
         scans = as_scans(scan)
         if prior is not None:
-            prior.check(self.fields.grid)
+            check_prior(prior, self.fields.grid)
         if self._exhaustive is not None:
             result = self._locate_by_paper(scans, prior)
         elif len(scans) == 1:
