@@ -14,6 +14,7 @@ from firstfix.core.estimate import Verdict
 from firstfix.core.se2 import SE2
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.localizer.place_belief import Pace, PlaceBelief, Support
+from firstfix.localizer.pose_monitor import Fit
 
 LIDAR = Lidar(beams=180)
 POSE = SE2(10.5, 1.2, 0.3)  # in the second of three equal rooms
@@ -112,13 +113,13 @@ def test_the_place_of_the_pose_confirms_it_and_the_pace_falls(places, view):
     places.pose_was_published()
     for pose in moved_on(places, view, 4):
         assert places.tracking_pace is Pace.EVERY_VIEW
-        assert places.support_for(pose) is Support.SAME_PLACE
+        assert places.support_for(pose, Fit.CONSISTENT) is Support.SAME_PLACE
     assert places.tracking_pace is Pace.BACKGROUND
 
 
 def test_a_young_pose_is_withdrawn_after_two_views(places, view):
     places.pose_was_published()
-    found = [places.support_for(NOWHERE) for _ in moved_on(places, view, 2)]
+    found = [places.support_for(NOWHERE, Fit.CONSISTENT) for _ in moved_on(places, view, 2)]
     assert found == [Support.OPEN, Support.WITHDRAWN]
 
 
@@ -126,10 +127,35 @@ def test_a_pose_that_many_views_have_confirmed_is_not_withdrawn(places, view):
     """Where the map is wrong, other places fit better for metres."""
     places.restart(Near(POSE, 1.0))
     for pose in moved_on(places, view, 6):
-        places.support_for(pose)
+        places.support_for(pose, Fit.CONSISTENT)
     places.restart()
     for _ in moved_on(places, view, 6):
-        assert places.support_for(NOWHERE) is Support.OPEN
+        assert places.support_for(NOWHERE, Fit.CONSISTENT) is Support.OPEN
+
+
+def test_any_pose_that_neither_places_nor_scans_support_is_withdrawn(places, view):
+    """It was confirmed, and then the robot was carried away."""
+    places.restart(Near(POSE, 1.0))
+    for pose in moved_on(places, view, 6):
+        places.support_for(pose, Fit.CONSISTENT)
+    places.restart()
+    fits = [Fit.DOUBTFUL, Fit.CONSISTENT, Fit.DOUBTFUL, Fit.DOUBTFUL]
+    moved = moved_on(places, view, 4)
+    found = [places.support_for(NOWHERE, fit) for fit, _ in zip(fits, moved, strict=True)]
+    assert found == [*3 * [Support.OPEN], Support.WITHDRAWN]
+
+
+def test_a_doubted_pose_is_watched_until_four_views_confirm_it_again(places, view):
+    places.restart(Near(POSE, 1.0))
+    for pose in moved_on(places, view, 5):
+        places.support_for(pose, Fit.CONSISTENT)
+    assert places.tracking_pace is Pace.BACKGROUND
+    places.doubt_pose()
+    assert places.update(view(pose), pose, places.tracking_pace)  # at once
+    for _ in range(4):
+        assert places.tracking_pace is Pace.EVERY_VIEW
+        places.support_for(pose, Fit.CONSISTENT)
+    assert places.tracking_pace is Pace.BACKGROUND
 
 
 @pytest.mark.parametrize(("confirmed", "needed"), [(0, 1), (2, 2), (6, 4)])
@@ -140,10 +166,10 @@ def test_another_sure_place_needs_half_as_many_views_as_have_confirmed(
     poses = list(moved_on(places, view, 1))
     places.pose_was_published()
     for _ in range(confirmed):
-        places.support_for(poses[-1])
+        places.support_for(poses[-1], Fit.CONSISTENT)
     places.belief = dataclasses.replace(
         places.belief,
         judgement=dataclasses.replace(places.belief.judgement, verdict=Verdict.UNIQUE),
     )
-    found = [places.support_for(NOWHERE) for _ in range(needed)]
+    found = [places.support_for(NOWHERE, Fit.CONSISTENT) for _ in range(needed)]
     assert found == [Support.OPEN] * (needed - 1) + [Support.OTHER_PLACE]

@@ -117,6 +117,58 @@ def test_a_small_slip_needs_no_search(monitor, hall_plan, seen, searches, metres
     assert searches == []
 
 
+@pytest.mark.parametrize("sigma", [0.01, 0.3])
+def test_what_the_filter_allows_for_is_not_corrected(monitor, seen, sigma):
+    """Along a corridor the best pose of one scan follows people who walk there."""
+    covariance = np.diag([sigma, sigma, 0.02]) ** 2
+    off = HERE @ SE2(0.2, 0.0, 0.0)
+    fits = [monitor.judge(seen(HERE, 0.1 * k), ODOM, off, covariance).fit for k in range(4)]
+    assert (Fit.ELSEWHERE in fits) is (sigma < 0.1)
+
+
+@pytest.mark.parametrize("room", [0, 1])
+def test_a_slip_among_equal_rooms_may_be_a_kidnap(three_rooms, three_rooms_locator, room):
+    """In a room that has no equal it is followed; here it is not known which room this is."""
+    monitor, rng = PoseMonitor(three_rooms_locator, CONFIG), np.random.default_rng(0)
+    here = SE2(2.5, 1.2, 0.3)
+    there = here @ SE2(0.4, 0.0, math.radians(15.0))
+    there = SE2(there.x + 8.0 * room, there.y, there.yaw)
+    fits = []
+    for k in range(6):
+        scan = LIDAR.scan(three_rooms, here if k < 3 else there, rng, 0.1 * k)
+        fits.append(monitor.judge(scan, ODOM, here).fit)
+    assert fits[:5] == [*3 * [Fit.CONSISTENT], Fit.DOUBTFUL, Fit.CONTRADICTED]
+
+
+def test_a_pose_that_fits_again_where_it_was_contradicted_stays(monitor, seen, absurd):
+    fits = []
+    for k in range(40):
+        scan = absurd(0.1 * k) if 5 <= k < 8 else seen(HERE, 0.1 * k)
+        fits.append(monitor.judge(scan, ODOM, HERE).fit)
+    assert fits == [*5 * [Fit.CONSISTENT], *3 * [Fit.DOUBTFUL], *32 * [Fit.CONSISTENT]]
+
+
+def test_particles_that_move_to_an_equal_room_nearby_do_not_end_a_contradiction(
+    three_rooms, three_rooms_locator
+):
+    monitor, rng = PoseMonitor(three_rooms_locator, CONFIG), np.random.default_rng(0)
+    here, beside = SE2(2.5, 1.2, 0.3), SE2(3.5, 1.2, 0.3)
+    fits = []
+    for k in range(30):
+        truth, tracked = (here, here) if k < 3 else (beside, here if k < 4 else beside)
+        scan = LIDAR.scan(three_rooms, truth, rng, 0.1 * k)
+        fits.append(monitor.judge(scan, ODOM, tracked).fit)
+    assert fits[2:5] == [Fit.CONSISTENT, Fit.DOUBTFUL, Fit.CONSISTENT]
+    lost = fits.index(Fit.CONTRADICTED)
+    assert 0.1 * (lost - 3) == pytest.approx(CONFIG.lost_after_s, abs=0.11)
+
+
+def test_a_fit_that_is_suddenly_worse_is_reported(monitor, seen, absurd):
+    for k in range(5):
+        assert not monitor.judge(seen(HERE, 0.1 * k), ODOM, HERE).is_sudden
+    assert monitor.judge(absurd(0.5), ODOM, HERE).is_sudden
+
+
 def test_contradiction_must_last(monitor, absurd):
     fits = [(0.1 * k, monitor.judge(absurd(0.1 * k), ODOM, HERE).fit) for k in range(32)]
     for stamp, fit in fits:

@@ -34,6 +34,7 @@ DOCUMENTED = re.findall(r"^\| `([\w.]+)` \|", PAGE.read_text(encoding="utf-8"), 
 
 BEAM = {"laser_model_type": "beam"}
 SKIP = {"laser_model_type": "likelihood_field_prob", "do_beamskip": True}
+STILL = {"update_min_d": 50.0, "update_min_a": 3.0}
 START = {
     "set_initial_pose": True,
     "initial_pose.x": 3.0,
@@ -120,8 +121,9 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "monitor.search_period_s": {"to": 1000.0},
     "monitor.confirmations": {"to": 5},
     "monitor.rest_period_s": {"to": 0.05, "in": "rooms"},
-    "monitor.correct_m": {"to": 0.01},
-    "monitor.correct_rad": {"to": 0.003},
+    # The slip of this drive: a filter that does not update leaves it to the monitor.
+    "monitor.correct_m": {"to": 1.0, "with": STILL},
+    "monitor.correct_rad": {"to": 0.003, "with": STILL | {"monitor.correct_m": 1.0}},
     "monitor.decided_cost": {"to": 0.002},
     "monitor.decided_views": {"to": 1, "in": "a loss", "with": {"belief.window": 1}},
     "belief.window": {"to": 1, "in": "rooms"},

@@ -65,6 +65,9 @@ _PARTS: Mapping[type[Any], Mapping[str, Any]] = {
     PoseTracker: {"_track": Track | None, "_monitor": PoseMonitor, "_has_leapt": bool},
     PoseMonitor: {
         "_contradicted_since": float | None,
+        "_suspected_since": float | None,
+        "_has_leapt": bool,
+        "_T_map_odom": SE2 | None,
         "_agreement": AgreementCounter,
         "_searched_at": float | None,
         "_usual_cost": float,
@@ -75,6 +78,7 @@ _PARTS: Mapping[type[Any], Mapping[str, Any]] = {
         "_places": tuple[Hypothesis, ...],
         "_credit": int,
         "_views_against": int,
+        "_views_lost": int,
         "_fixes": dict[str, Prior],
         "belief": Belief,
     },

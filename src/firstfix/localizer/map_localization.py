@@ -226,6 +226,8 @@ class MapLocalization:
         if not tracked.is_confirmed:
             reason = f"odometry has leapt, {tracked.fit_in_words}: waiting for a scan that fits"
             return [self.status(view.stamp, reason, place.evidence)]
+        if tracked.judgement.is_sudden:
+            self.places.doubt_pose()
         if self.places.tracking_pace is Pace.BACKGROUND and self._is_settled(tracked):
             self._unweighed = view, tracked  # the search takes longer than a scan: the pose first
         elif revised := self._reconsider(view, tracked):
@@ -248,19 +250,25 @@ class MapLocalization:
         if not self._weigh(view, pace):
             return []
         T_map_base = tracked.pose.T_map_base
-        support = self.places.support_for(T_map_base)
+        support = self.places.support_for(T_map_base, tracked.judgement.fit)
         if support is Support.SAME_PLACE and self.places.is_decided_by_evidence:
             self._chosen_by = None
         if support is Support.OTHER_PLACE:
             best, reason = self.places.places[0], self.places.belief.reason
             reason = f"{best.pose.distance_to(T_map_base):.1f} m from the tracked pose {reason}"
             return self._arrive(view, best, Event.RELOCALIZED, reason)
-        if support is Support.WITHDRAWN:
-            self.tracker.stop()
-            self._chosen_by = None
+        return self._withdraw(view) if support is Support.WITHDRAWN else []
+
+    def _withdraw(self, view: View) -> list[Output]:
+        """Stop tracking, and go on with all places that the belief holds."""
+        self._lost_T_map_odom = self.tracker.T_map_odom
+        self.tracker.stop()
+        self._chosen_by = None
+        if self.places.places and self.places.belief.verdict is not Verdict.NO_MATCH:
             self._fire(Event.REVOKED)
             return self._list_places(view)
-        return []
+        self._fire(Event.CONTRADICTED)
+        return [self.status(view.stamp, self.places.belief.reason)]
 
     def _arrive(self, view: View, place: Hypothesis, event: Event, reason: str) -> list[Output]:
         """Publish where the robot was found, and track it from there."""

@@ -30,6 +30,7 @@ from firstfix.global_localization.places import is_same_place
 from firstfix.global_localization.prior import Prior
 from firstfix.global_localization.sensors import joint_beams
 from firstfix.global_localization.verdict import count_rivals
+from firstfix.localizer.pose_monitor import Fit
 
 # In the background a view each two metres watches a tracked pose at little cost.
 _BACKGROUND_M = 2.0
@@ -42,6 +43,7 @@ _MOST_CREDIT = 2 * _CONFIRMING_VIEWS
 
 # A young pose with less probability than this in two consecutive views is withdrawn. An old one is
 # not: where the map is wrong, other places fit better for metres.
+# Any pose is, if the scans do not fit there either: the robot was carried away.
 _WITHDRAWN_SHARE = 0.05
 _WITHDRAWING_VIEWS = 2
 
@@ -88,6 +90,7 @@ class PlaceBelief:
         self._places: tuple[Hypothesis, ...] = ()
         self._credit = 0  # views that have confirmed the published pose
         self._views_against = 0
+        self._views_lost = 0  # in a row that neither the belief nor the monitor puts there
         self._fixes: dict[str, Prior] = {}  # by their source
         self.belief = begin(fields, None, config)
 
@@ -202,7 +205,12 @@ class PlaceBelief:
 
     def pose_was_published(self) -> None:
         """Watch closely at first: the pose may be wrong."""
-        self._credit = self._views_against = 0
+        self._credit = self._views_against = self._views_lost = 0
+
+    def doubt_pose(self) -> None:
+        """Weigh the next scan, and watch a settled pose as closely as a new one."""
+        if self.tracking_pace is Pace.BACKGROUND:
+            self._credit, self._used_at = 0, None
 
     @property
     def tracking_pace(self) -> Pace:
@@ -210,13 +218,15 @@ class PlaceBelief:
         is_settled = self._credit >= _CONFIRMING_VIEWS and self._views_against == 0
         return Pace.BACKGROUND if is_settled else Pace.EVERY_VIEW
 
-    def support_for(self, T_map_base: SE2) -> Support:
+    def support_for(self, T_map_base: SE2, fit: Fit) -> Support:
         """Compare a published pose with the belief; call it once after each update.
 
         Parameters
         ----------
         T_map_base : SE2
             The pose.
+        fit : Fit
+            How the newest scan fits there.
 
         Returns
         -------
@@ -226,16 +236,21 @@ class PlaceBelief:
         poses = [SE2.from_array(pose) for pose in self.belief.poses]
         here = [is_same_place(pose, T_map_base) for pose in poses]
         if here and here[0]:
-            self._credit, self._views_against = min(self._credit + 1, _MOST_CREDIT), 0
+            self._credit = min(self._credit + 1, _MOST_CREDIT)
+            self._views_against = self._views_lost = 0
             return Support.SAME_PLACE
         is_sure_elsewhere = self.belief.verdict is Verdict.UNIQUE
         share = float(self.belief.probabilities[here].sum())
-        is_against = share < _WITHDRAWN_SHARE and self.belief.elsewhere < 0.5
+        is_unlikely = share < _WITHDRAWN_SHARE
+        is_against = is_unlikely and self.belief.elsewhere < 0.5
         self._views_against = self._views_against + 1 if is_against else 0
+        is_lost = is_unlikely and fit is Fit.DOUBTFUL
+        self._views_lost = self._views_lost + 1 if is_lost else 0
         if is_sure_elsewhere and 2 * self._views_against > self._credit:
             return Support.OTHER_PLACE
         is_young = self._credit < _CONFIRMING_VIEWS
-        if is_young and self._views_against >= _WITHDRAWING_VIEWS:
+        against = max(self._views_against if is_young else 0, self._views_lost)
+        if against >= _WITHDRAWING_VIEWS:
             return Support.WITHDRAWN
         return Support.OPEN
 

@@ -128,7 +128,7 @@ class PoseTracker:
         self._track = step(self._track, T_odom_base, scans, self._rng)
         T_map_base = self._track.T_map_odom @ T_odom_base
         covariance = self._track.state.estimate.covariance
-        judgement = self._monitor.judge(scans, T_odom_base, T_map_base)
+        judgement = self._monitor.judge(scans, T_odom_base, T_map_base, covariance)
         if judgement.fit is Fit.CONSISTENT:
             self._has_leapt = False
             T_map_base, covariance = fuse_with_scan(
