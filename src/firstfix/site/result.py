@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from firstfix.core.errors import InputError
-from firstfix.core.estimate import Hypothesis, Verdict
+from firstfix.core.estimate import Hypothesis, LocateResult, SearchReport, Verdict
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
@@ -137,18 +137,11 @@ class SiteResult:
         InputError
             If there is no place, matplotlib is not installed or the file cannot be written.
         """
-        from firstfix.plots import figure, result_picture
-
         if self.grid is None or self.best is None:
             raise InputError("This result has no map or no place to draw. Plot one of Site.locate.")
-        drawn = result_picture.result_figure(self.grid, self.scans, self._in_best_map(), truth)
-        if path is not None:
-            figure.save_figure(drawn, Path(path))
-        return drawn
+        return self._in_best_map().plot(path, truth=truth)
 
-    def _in_best_map(self) -> Any:
-        from firstfix.core.estimate import LocateResult, SearchReport
-
+    def _in_best_map(self) -> LocateResult:
         return LocateResult(
             verdict=self.verdict,
             reason=f"map {self.map_id}: {self.reason}",

@@ -90,6 +90,7 @@ class Encoder:
             "edge_states": [],
             "maps": [_map(entry) for entry in report.maps],
             "velocity": _velocity(report.velocity),
+            "errors": [_error(error, self._identity.version) for error in report.errors],
         }
         make = self._state_v2 if self._identity.version is Version.V2 else self._state_v3
         return msgspec.json.encode(make(common, report))
@@ -100,7 +101,6 @@ class Encoder:
             **common,
             agv_position=_position_v2(report.position),
             action_states=[_action_v2(action) for action in report.actions],
-            errors=[_error(error, Version.V2) for error in report.errors],
             battery_state=v2.BatteryState(battery_charge=0.0, charging=False),
             safety_state=v2.SafetyState(e_stop="NONE", field_violation=False),
             information=[
@@ -116,7 +116,6 @@ class Encoder:
             mobile_robot_position=_position_v3(report.position),
             action_states=[],
             instant_action_states=[_action_v3(action) for action in report.actions],
-            errors=[_error(error, Version.V3) for error in report.errors],
             power_supply=v3.PowerSupply(state_of_charge=0.0, charging=False),
             safety_state=v3.SafetyState(active_emergency_stop="NONE", field_violation=False),
             information=[
@@ -139,27 +138,22 @@ class Encoder:
 
 
 def _position_v2(position: Position) -> v2.AgvPosition:
-    return v2.AgvPosition(
-        x=position.x,
-        y=position.y,
-        theta=position.theta,
-        map_id=position.map_id,
-        position_initialized=position.is_localized,
-        localization_score=position.score,
-        deviation_range=position.deviation_m,
-    )
+    return v2.AgvPosition(**_place(position), position_initialized=position.is_localized)
 
 
 def _position_v3(position: Position) -> v3.MobileRobotPosition:
-    return v3.MobileRobotPosition(
-        x=position.x,
-        y=position.y,
-        theta=position.theta,
-        map_id=position.map_id,
-        localized=position.is_localized,
-        localization_score=position.score,
-        deviation_range=position.deviation_m,
-    )
+    return v3.MobileRobotPosition(**_place(position), localized=position.is_localized)
+
+
+def _place(position: Position) -> dict[str, Any]:
+    return {
+        "x": position.x,
+        "y": position.y,
+        "theta": position.theta,
+        "map_id": position.map_id,
+        "localization_score": position.score,
+        "deviation_range": position.deviation_m,
+    }
 
 
 def _velocity(velocity: Velocity | None) -> v2.Velocity | None:
@@ -174,21 +168,19 @@ def _map(entry: MapEntry) -> v2.Map:
 
 
 def _action_v2(action: ActionReport) -> v2.ActionState:
-    return v2.ActionState(
-        action_id=action.id,
-        action_type=action.type,
-        action_status=action.status.value,
-        result_description=action.result,
-    )
+    return v2.ActionState(**_progress(action), result_description=action.result)
 
 
 def _action_v3(action: ActionReport) -> v3.ActionState:
-    return v3.ActionState(
-        action_id=action.id,
-        action_type=action.type,
-        action_status=action.status.value,
-        action_result=action.result,
-    )
+    return v3.ActionState(**_progress(action), action_result=action.result)
+
+
+def _progress(action: ActionReport) -> dict[str, str]:
+    return {
+        "action_id": action.id,
+        "action_type": action.type,
+        "action_status": action.status.value,
+    }
 
 
 def _error(error: ErrorReport, version: Version) -> v2.Error:

@@ -36,17 +36,21 @@ class Connection(Header, frozen=True, kw_only=True):
     connection_state: str
 
 
-class AgvPosition(Wire, frozen=True, kw_only=True):
-    """Where the robot is."""
+class Position(Wire, frozen=True, kw_only=True):
+    """Where the robot is, in all versions."""
 
     x: float
     y: float
     theta: float
     map_id: str
-    position_initialized: bool
     localization_score: float
     deviation_range: float | None = None
-    map_description: str | None = None
+
+
+class AgvPosition(Position, frozen=True, kw_only=True):
+    """Where the robot is."""
+
+    position_initialized: bool
 
 
 class Velocity(Wire, frozen=True, kw_only=True):
@@ -120,8 +124,8 @@ class SafetyState(Wire, frozen=True, kw_only=True):
     field_violation: bool
 
 
-class State(Header, frozen=True, kw_only=True):
-    """The state of the robot."""
+class AnyState(Header, frozen=True, kw_only=True):
+    """The state of the robot: what all versions have."""
 
     order_id: str
     order_update_id: int
@@ -131,14 +135,19 @@ class State(Header, frozen=True, kw_only=True):
     operating_mode: str
     node_states: list[Any]
     edge_states: list[Any]
+    errors: list[Error]
+    maps: list[Map]
+    velocity: Velocity | None = None
+
+
+class State(AnyState, frozen=True, kw_only=True):
+    """The state of the robot."""
+
     action_states: list[ActionState]
     battery_state: BatteryState
-    errors: list[Error]
     safety_state: SafetyState
-    maps: list[Map]
     agv_position: AgvPosition
     information: list[Info]
-    velocity: Velocity | None = None
 
 
 class Parameter(Wire, frozen=True, kw_only=True):

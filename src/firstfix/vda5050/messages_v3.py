@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from firstfix.vda5050.messages import Error, Header, Map, Velocity, Wire
+from firstfix.vda5050.messages import AnyState, Header, Position, Velocity, Wire
 
 
-class MobileRobotPosition(Wire, frozen=True, kw_only=True):
+class MobileRobotPosition(Position, frozen=True, kw_only=True):
     """Where the robot is."""
 
-    x: float
-    y: float
-    theta: float
-    map_id: str
     localized: bool
-    localization_score: float
-    deviation_range: float | None = None
 
 
 class Visualization(Header, frozen=True, kw_only=True):
@@ -58,23 +50,12 @@ class SafetyState(Wire, frozen=True, kw_only=True):
     field_violation: bool
 
 
-class State(Header, frozen=True, kw_only=True):
+class State(AnyState, frozen=True, kw_only=True):
     """The state of the robot."""
 
-    order_id: str
-    order_update_id: int
-    last_node_id: str
-    last_node_sequence_id: int
-    driving: bool
-    operating_mode: str
-    node_states: list[Any]
-    edge_states: list[Any]
     action_states: list[ActionState]
     instant_action_states: list[ActionState]
     power_supply: PowerSupply
-    errors: list[Error]
     safety_state: SafetyState
-    maps: list[Map]
     mobile_robot_position: MobileRobotPosition
     information: list[Info]
-    velocity: Velocity | None = None
