@@ -84,7 +84,14 @@ def test_queries_go_to_the_copy_that_has_least_to_do(
     monkeypatch.setattr(engine, "ask", ask)
 
     async def drive() -> list[str | None]:
-        await fleet.prepare()
+        preparing = asyncio.create_task(fleet.prepare())
+        while len(fleet.prepared) + len(fleet.faults) < len(fleet.map_ids):
+            assert not fleet.is_ready
+            await asyncio.sleep(0.0)
+        assert not fleet.is_ready, "kernels are compiled first, also those of the copies"
+        await preparing
+        assert fleet.is_ready
+        assert fleet.warm == set(range(2 * len(fleet.shards)))
         asked.clear()
         queries = [SiteQuery.of(scan_of(room, POSE)) for room in ("first", "second")]
         return [result.map_id for result in await asyncio.gather(*map(fleet.locate, queries))]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -11,7 +12,7 @@ from typing import TypeVar
 
 from firstfix.core.errors import InputError
 from firstfix.fleet.engine import Engine, WorkerLostError
-from firstfix.fleet.jobs import Job, Look, Prepare, Search
+from firstfix.fleet.jobs import Job, Look, Prepare, Search, WarmUp
 from firstfix.site.judge import judge_site
 from firstfix.site.look import Looked
 from firstfix.site.query import SiteQuery
@@ -56,6 +57,8 @@ class Fleet:
         Processor time of each worker when it last answered, s; from 0 after a loss.
     lost_jobs : int
         Jobs that were lost with their worker.
+    warm : set of int
+        Workers that have compiled or loaded their kernels.
     """
 
     engine: Engine
@@ -66,6 +69,7 @@ class Fleet:
     memory: dict[int, int] = field(default_factory=dict)
     cpu_s: dict[int, float] = field(default_factory=dict)
     lost_jobs: int = 0
+    warm: set[int] = field(default_factory=set)
     _running: Counter[int] = field(default_factory=Counter)
 
     @property
@@ -75,12 +79,14 @@ class Fleet:
 
     @property
     def is_ready(self) -> bool:
-        """True when every map is prepared or known to be unusable."""
-        return len(self.prepared) + len(self.faults) == sum(map(len, self.shards))
+        """True when every map is prepared or known to be unusable, and no worker has to compile."""
+        maps, workers = sum(map(len, self.shards)), self.copies * len(self.shards)
+        return len(self.prepared) + len(self.faults) == maps and len(self.warm) == workers
 
     async def prepare(self) -> None:
-        """Prepare all maps, each worker one after the other."""
+        """Prepare all maps, each worker one after the other; then let all workers warm up."""
         await asyncio.gather(*(self._prepare(i) for i in range(len(self.shards))))
+        await asyncio.gather(*(self._warm_up(i) for i in range(self.copies * len(self.shards))))
 
     async def locate(self, query: SiteQuery, only: str | None = None) -> SiteResult:
         """Find the map and the place of a robot.
@@ -164,6 +170,11 @@ class Fleet:
                 self.prepared.add(map_id)
             else:
                 self.faults[map_id] = fault
+
+    async def _warm_up(self, worker: int) -> None:
+        with contextlib.suppress(NotReadyError):  # queries will say so
+            await self._ask(worker, WarmUp())
+        self.warm.add(worker)
 
     async def _all(self, copy: int, asked: Sequence[tuple[int, Job[T]]]) -> list[T]:
         """Let several workers work at once; if one fails, wait for no other."""

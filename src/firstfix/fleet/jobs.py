@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Generic, Protocol, TypeVar
 
 from firstfix.core.errors import FirstfixError
+from firstfix.core.se2 import SE2
 from firstfix.io.maps.site_yaml import SiteMap, read_site
+from firstfix.localizer.precompile import scan_of, small_room
 from firstfix.site.look import Looked
 from firstfix.site.places import SiteCandidates
 from firstfix.site.query import SiteQuery
@@ -47,6 +49,20 @@ class Prepare:
         except FirstfixError as error:
             return f"The map {self.map_id} cannot be used: {error}"
         return site.faults.get(self.map_id)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class WarmUp:
+    """Search one map for scans of a drawn room: no robot waits for the compiler then."""
+
+    def run(self, site: Site) -> None:
+        """Do it."""
+        map_ids, room = site.map_ids[:1], small_room()
+        first, second = (scan_of(room, SE2(x, 2.5, 0.4)) for x in (3.0, 3.5))
+        step = [SE2.identity(), SE2(0.5, 0.0, 0.0)]
+        for query in (SiteQuery.of(first), SiteQuery.of([first, replace(second, stamp=1.0)], step)):
+            site.first_look(query, map_ids)
+            site.search(query, map_ids)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
