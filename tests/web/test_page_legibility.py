@@ -125,7 +125,7 @@ def test_the_path_to_a_goal_goes_around_walls(
     assert all(floor.has_room(a, b, 0.05) for a, b in itertools.pairwise(path))
     assert not floor.has_room(path[0], path[-1], 0.05)  # the straight line meets walls
     middle = np.mean(path[-2:], axis=0)
-    assert has_colour(page, "goal", *middle)
+    wait_until(lambda: has_colour(page, "goal", *middle), lambda: "the path is drawn")
     page.shot(tmp_path / "path.png")
     print(tmp_path / "path.png")  # noqa: T201 - for people
     page.page.click("#pause")
@@ -141,7 +141,7 @@ def test_a_goal_too_near_to_a_wall_is_answered_there_without_a_flag(page: Visit)
     page.page.mouse.click(px, py)
     page.page.wait_for_selector("#answer", state="visible")
     assert "too close to a wall. Pick a point" in page.page.inner_text("#answer")
-    assert is_beside(page, px, py)
+    wait_until(lambda: is_beside(page, px, py), lambda: "the answer points there")
     x, y = 20.0, 11.05
     page.page.wait_for_timeout(200)
     assert not has_colour(page, "goal", x, y + 20.0 / page.scale)  # of its pennant
@@ -163,7 +163,7 @@ def test_a_pose_that_does_not_fit_is_answered_where_it_was_proposed(
     page.press_and_pull(x, 8.0, 0.0)
     page.page.wait_for_selector("#answer", state="visible")
     assert "does not explain the scan" in page.page.inner_text("#answer")
-    assert is_beside(page, *at)
+    wait_until(lambda: is_beside(page, *at), lambda: "the answer points there")
     page.shot(tmp_path / "refused.png")
     print(tmp_path / "refused.png")  # noqa: T201 - for people
     page.wait_for_state("LOCALIZED")
