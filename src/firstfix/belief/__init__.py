@@ -26,7 +26,9 @@ cannot rule out:
    of independent views. Priors are added.
 4. *Merging.* Poses at one place become one and keep the oldest id; what is negligible is dropped,
    and its mass is elsewhere.
-5. *Verdict.* A place is published when it is sure in two views from different poses. A sensor that
+5. *Elsewhere.* Places that are not held get probability, too: little if the best place explains
+   every view better than the third best place of that view's own search does.
+6. *Verdict.* A place is published when it is sure in two views from different poses. A sensor that
    sees much may decide by one scan, as in the static stage; a prior counts as a first view.
 
 A view at the pose of the latest one joins it: several scans at rest tell people from walls

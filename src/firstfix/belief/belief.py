@@ -10,25 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.belief.config import BeliefConfig
+from firstfix.belief.elsewhere import missed_log_odds, rival_cost, with_missed
 from firstfix.belief.enter import propose
-from firstfix.belief.evidence import WRONG_MAP_COST, shares
-from firstfix.belief.hints import Hint, Source, hint_logs
+from firstfix.belief.evidence import shares
+from firstfix.belief.hints import Hint, Source, hint_logs, log_anywhere
 from firstfix.belief.joint import joint_log_likelihoods, power_of
-from firstfix.belief.judge import ALONE_PROBABILITY, Judgement, Rule, judge
+from firstfix.belief.judge import Judgement, Rule, judge
 from firstfix.belief.merge import merge
+from firstfix.belief.misses import MOST_MISSES, count_misses
 from firstfix.belief.place import listed_places
 from firstfix.belief.planar import between, compose, in_cells, to_map
 from firstfix.belief.rejoin import rejoin
 from firstfix.belief.remember import remembered
 from firstfix.belief.tracks import Tracks, at_rest, follow, look_again, trace_back
 from firstfix.belief.view import Observation, View
+from firstfix.belief.without_priors import is_hinted, share_without_programs, shares_by_views
 from firstfix.core.estimate import Hypothesis, SearchReport, Verdict
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS
-from firstfix.global_localization.places import distinct_places
 from firstfix.global_localization.prior import Prior, check_prior
-from firstfix.global_localization.verdict import place_probabilities
 
 # A view brings news where the robot has moved or turned by this much.
 NEWS_M = 0.3
@@ -43,10 +44,6 @@ NEGLIGIBLE = 1e-6
 
 # Best places whose beams are all compared.
 CAREFUL_PLACES = 24
-
-# So many views in a row that the best place does not explain, though others do: the robot has been
-# moved, or its wheels have slipped. What was seen before says nothing then.
-MOST_MISSES = 2
 
 _NOTHING_SEEN = Judgement(Verdict.NO_MATCH, "no view yet: waiting for the first scan", None)
 
@@ -70,7 +67,9 @@ class Belief:
     probabilities : ndarray, shape (n,)
         Of the places.
     elsewhere : float
-        Probability of a place that is not listed: outside, unmapped, in another map, or dropped.
+        Probability of a place that is not held: outside, unmapped, in another map, dropped, missed.
+    missed : float
+        The part of it that belongs to places of the map: see `elsewhere.missed_log_odds`.
     odometry : SE2
         ``T_odom_base`` to which the places are predicted.
     judgement : Judgement
@@ -93,6 +92,7 @@ class Belief:
     odometry: SE2
     judgement: Judgement
     search: SearchReport
+    missed: float = 0.0
     next_id: int = 0
     misses: int = 0
 
@@ -100,6 +100,11 @@ class Belief:
     def verdict(self) -> Verdict:
         """Whether the best place may be published."""
         return self.judgement.verdict
+
+    @property
+    def held(self) -> float:
+        """Probability that is left if no place of the map was missed."""
+        return 1.0 - self.missed
 
     @property
     def reason(self) -> str:
@@ -111,11 +116,9 @@ class Belief:
         """Probabilities of the places by the views alone, priors left out, shape (n,)."""
         if not self.window:
             return np.empty(0)
-        grid = self.fields.grid
-        logs = hint_logs(self.tracks.now, self.window[-1], self.hints, grid)
-        weights = self.probabilities * np.exp(-logs)
-        shares: NDArray[np.float64] = weights / (weights.sum() + self.elsewhere)
-        return shares
+        return shares_by_views(
+            self.tracks, self.probabilities, self.missed, self.window[-1], self.hints, self.fields
+        )
 
     @cached_property
     def poses(self) -> NDArray[np.float64]:
@@ -256,6 +259,8 @@ def update(belief: Belief, view: View) -> Belief:
         return _blind(belief, hits)
     window, held = _followed(belief, view)
     entering, search = propose(window, belief.hints, belief.next_id, fields, config)
+    rival = rival_cost(entering, fields.grid.resolution)
+    window = (*window[:-1], replace(window[-1], rival_cost=rival))
     held = rejoin(held, entering, window, fields)
     tracks = held.joined_by(_with_past(entering, window, belief))
 
@@ -264,13 +269,15 @@ def update(belief: Belief, view: View) -> Belief:
     tracks = look_again(best, window, fields).joined_by(others)
     tracks, logs = _ranked(tracks, window, belief)
 
-    probabilities, _ = shares(logs, power_of(window))
-    kept = probabilities >= NEGLIGIBLE
-    tracks, probabilities = tracks.take(kept), probabilities[kept]
+    listed, _ = shares(logs, power_of(window))
+    kept = listed >= NEGLIGIBLE
+    tracks = tracks.take(kept)
+    probabilities, missed = _with_missed(listed[kept], tracks, window, belief)
     rule = Rule(
         config.sure_probability,
-        hinted=_is_hinted(tracks, window, belief),
-        evidence=_share_without_priors(tracks, probabilities, window, belief),
+        hinted=is_hinted(tracks, window[-1], belief.hints, fields),
+        evidence=share_without_programs(tracks, probabilities, window[-1], belief.hints, fields),
+        missed=missed,
     )
     judgement = judge(
         tracks.costs, tracks.ids, probabilities, window, belief.judgement.favourite, rule
@@ -283,8 +290,9 @@ def update(belief: Belief, view: View) -> Belief:
         elsewhere=max(0.0, 1.0 - float(probabilities.sum())),
         judgement=judgement,
         search=search,
+        missed=missed,
         next_id=belief.next_id + len(entering),
-        misses=_misses(belief.misses, judgement, tracks, entering, window),
+        misses=count_misses(belief.misses, judgement, tracks, entering, window[-1]),
     )
 
 
@@ -357,53 +365,13 @@ def _ranked(
     return tracks.take(kept).named(names), logs[kept]
 
 
-def _is_hinted(tracks: Tracks, window: tuple[Observation, ...], belief: Belief) -> bool:
-    if not belief.hints or len(tracks) == 0:
-        return False
-    logs = hint_logs(tracks.now[:1], window[-1], belief.hints, belief.fields.grid)
-    return bool(logs[0] >= -1.0)
-
-
-def _share_without_priors(
-    tracks: Tracks,
-    probabilities: NDArray[np.float64],
-    window: tuple[Observation, ...],
-    belief: Belief,
-) -> float:
-    """Return the probability of the best place with the priors of programs left out."""
-    measured = [hint for hint in belief.hints if hint.source is Source.MEASURED]
-    if not measured or len(tracks) == 0:
-        return 1.0
-    logs = hint_logs(tracks.now, window[-1], measured, belief.fields.grid)
-    if not logs.any():
-        return 1.0
-    weights = probabilities * np.exp(-logs)
-    elsewhere = max(0.0, 1.0 - float(probabilities.sum()))
-    return float(weights[0] / (weights.sum() + elsewhere))
-
-
-def _misses(
-    before: int,
-    judgement: Judgement,
-    tracks: Tracks,
-    entering: Tracks,
-    window: tuple[Observation, ...],
-) -> int:
-    """Count the views in a row that the best place does not explain, though others do."""
-    if not judgement.unexplained or len(entering) == 0:
-        return 0
-    best = float(tracks.costs[0, -1]) if len(tracks) else WRONG_MAP_COST
-    costs = entering.costs[:, 0]
-    if costs.min() >= 0.5 * best:
-        return 0
-    # One look of a sensor that sees much is enough to know that what was seen before misleads.
-    return MOST_MISSES if _is_decisive(entering, window[-1]) else before + 1
-
-
-def _is_decisive(entering: Tracks, seen: Observation) -> bool:
-    """Tell whether the newest view alone would have decided for one of the places it proposes."""
-    if not seen.decides_alone:
-        return False
-    costs = entering.costs[:, 0]
-    places = distinct_places(entering.now, costs, seen.resolution, CAREFUL_PLACES)
-    return float(place_probabilities(costs[places], len(seen.beams))[0]) >= ALONE_PROBABILITY
+def _with_missed(
+    listed: NDArray[np.float64], tracks: Tracks, window: tuple[Observation, ...], belief: Belief
+) -> tuple[NDArray[np.float64], float]:
+    """Leave room for places that are not held; priors hold for these, too."""
+    if len(tracks) == 0:
+        return listed, 0.0
+    grid = belief.fields.grid
+    best = float(hint_logs(tracks.now[:1], window[-1], belief.hints, grid)[0])
+    prior = log_anywhere(window[-1], belief.hints, belief.fields) - best
+    return with_missed(listed, missed_log_odds(tracks, window, belief.config) + prior)

@@ -16,7 +16,9 @@ class BeliefConfig:
     first_shortlist: int = setting(600, "places of the first search that enter", 1, 100_000)
     shortlist: int = setting(150, "places of each later search that enter", 1, 100_000)
     places: int = setting(600, "places held at most; the rest counts as elsewhere", 2, 100_000)
-    sure_probability: float = setting(0.98, "least probability of a place that is sure", 0.5, 1.0)
+    sure_probability: float = setting(
+        0.98, "least share of a place that is sure, of the places that are held", 0.5, 1.0
+    )
 
     def __post_init__(self) -> None:
         check_settings(self)

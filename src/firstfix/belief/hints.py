@@ -11,11 +11,16 @@ from numpy.typing import NDArray
 
 from firstfix.belief.planar import between, compose, to_map
 from firstfix.belief.view import Observation
+from firstfix.core.angles import FULL_TURN
 from firstfix.core.grid import OccupancyGrid
+from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.prior import Prior
 
 # After so long a way odometry no longer tells where the prior was.
 _FADES_M = 10.0
+
+# A robot may be anywhere: at so many positions of the map, with so many headings each.
+_SAMPLED, _SAMPLED_HEADINGS = 500, 8
 
 
 class Source(Enum):
@@ -68,3 +73,15 @@ def hint_logs(
         if np.hypot(back[0], back[1]) * grid.resolution <= _FADES_M:
             logs += hint.prior.log_likelihood(to_map(compose(poses, back), grid))
     return logs
+
+
+def log_anywhere(seen: Observation, hints: Sequence[Hint], fields: MapFields) -> float:
+    """Return what the hints say of a place anywhere in the map: the log of the mean likelihood."""
+    positions = fields.positions
+    if not hints or len(positions) == 0:
+        return 0.0
+    index = np.unique(np.linspace(0, len(positions) - 1, _SAMPLED).round().astype(np.int64))
+    xy = np.repeat(np.column_stack(positions.centres(index)), _SAMPLED_HEADINGS, axis=0)
+    turns = np.tile(np.arange(_SAMPLED_HEADINGS) * (FULL_TURN / _SAMPLED_HEADINGS), len(index))
+    logs = hint_logs(np.column_stack([xy, turns]), seen, hints, fields.grid)
+    return float(np.log(np.mean(np.exp(logs))))

@@ -24,6 +24,9 @@ STAYING_PROBABILITY = 0.5
 # decides.
 ALONE_PROBABILITY = 0.95
 
+MOST_MISSED = 0.05
+"""A place is not sure while places of the map that are not held have more probability."""
+
 # A second decision counts from a view that was taken this far away, or turned by this much.
 SECOND_LOOK_M = 0.3
 SECOND_LOOK_RAD = math.radians(15.0)
@@ -77,16 +80,24 @@ class Rule:
     Parameters
     ----------
     probability : float
-        Least probability.
+        Least share of what is held.
     hinted : bool
         True if a prior speaks for the best place: then one view is enough.
     evidence : float
         Probability of the best place with the priors of programs left out; 1 without such a prior.
+    missed : float
+        Probability of the places of the map that are not held.
     """
 
     probability: float
     hinted: bool
     evidence: float = 1.0
+    missed: float = 0.0
+
+    @property
+    def held(self) -> float:
+        """Probability of all that is held, or that no map explains."""
+        return 1.0 - self.missed
 
 
 def judge(
@@ -124,7 +135,7 @@ def judge(
         The verdict and its reason.
     """
     seen = window[-1]
-    if len(ids) == 0 or probabilities.sum() < 0.5:
+    if len(ids) == 0 or probabilities.sum() + rule.missed < 0.5:
         return Judgement(Verdict.NO_MATCH, _nowhere(len(window)), None, unexplained=True)
     known = before if before is not None and before.id == ids[0] else None
     stays = known is not None and known.published and probabilities[0] >= STAYING_PROBABILITY
@@ -134,9 +145,9 @@ def judge(
         return Judgement(Verdict.AMBIGUOUS, reason, kept, unexplained=True)
     alone = seen.decides_alone and _alone(costs[:, -1], len(seen.beams)) >= ALONE_PROBABILITY
     # A first view is judged by the law of single scans, which is known well, and is less strict.
-    first = alone and len(window) == 1 and probabilities[0] >= ALONE_PROBABILITY
-    if not (stays or first) and probabilities[0] < rule.probability:
-        return Judgement(Verdict.AMBIGUOUS, _undecided(probabilities, len(window)), None)
+    least = ALONE_PROBABILITY if alone and len(window) == 1 else rule.probability
+    if not stays and (rule.missed > MOST_MISSED or probabilities[0] < least * rule.held):
+        return Judgement(Verdict.AMBIGUOUS, _undecided(probabilities, rule, len(window)), None)
 
     if not stays and rule.evidence < SHARE_WITHOUT_PRIOR:
         return Judgement(Verdict.AMBIGUOUS, _chosen_by_prior(probabilities, rule), None)
@@ -179,11 +190,16 @@ def _sure(views: int, *, hinted: bool) -> str:
     return f"{which} here and nowhere else nearly as well"
 
 
-def _undecided(probabilities: NDArray[np.float64], views: int) -> str:
+def _undecided(probabilities: NDArray[np.float64], rule: Rule, views: int) -> str:
     rivals = int(np.count_nonzero(probabilities >= RIVAL_SHARE * probabilities[0]))
     which = "the view" if views == 1 else f"the latest {views} views"
     if rivals > 1:
         return f"{rivals} places explain {which} about as well; motion may tell them apart"
+    if probabilities[0] >= rule.probability * rule.held:
+        return (
+            f"one place explains {which} best, but not so well that it must be the right one: "
+            f"{rule.missed:.0%} is left to places that are not listed"
+        )
     return f"one place explains {which} best, but others not badly enough to be sure"
 
 

@@ -46,9 +46,10 @@ def listed_places(
     Returns
     -------
     tuple of Hypothesis
-        Those with a share of a thousandth, and at least two if there are two; with their ids.
+        Those with a thousandth of what all places have, and at least two if there are two;
+        with their ids.
     """
-    worth = int(np.count_nonzero(probabilities >= _LISTED_SHARE))
+    worth = int(np.count_nonzero(probabilities >= _LISTED_SHARE * probabilities.sum()))
     n = min(len(tracks), _MOST_LISTED, max(_LEAST_LISTED, worth))
     if n == 0:
         return ()

@@ -17,7 +17,12 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import Beams
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
-from firstfix.global_localization.sensors import covered_angle, joint_beams, see_enough
+from firstfix.global_localization.sensors import (
+    covered_angle,
+    covered_m2,
+    joint_beams,
+    see_enough,
+)
 from firstfix.global_localization.verify import verify
 
 # More scans at rest add nothing: what moves has moved.
@@ -86,10 +91,14 @@ class Observation:
         Taken at one place, oldest first.
     resolution : float
         Side of a cell, m.
+    rival_cost : float
+        Mean cost of a beam, nats, at the third best place of the view's own search; infinite before
+        that, or if there is none.
     """
 
     views: tuple[View, ...]
     resolution: float
+    rival_cost: float = math.inf
 
     @cached_property
     def scans(self) -> tuple[LaserScan, ...]:
@@ -124,6 +133,11 @@ class Observation:
     def field_of_view(self) -> float:
         """Angle in which there are beams, all sensors together, rad, at most a full turn."""
         return min(2.0 * math.pi, sum(covered_angle(scan) for scan in self.scans))
+
+    @cached_property
+    def covered_m2(self) -> float:
+        """Area that the sensors cover in an open space, m²."""
+        return covered_m2(self.scans)
 
     @property
     def decides_alone(self) -> bool:

@@ -143,5 +143,9 @@ def covered_angle(scan: LaserScan) -> float:
 
 def see_enough(scans: Sequence[LaserScan]) -> bool:
     """Tell whether sensors cover so much that one scan of each can be enough for UNIQUE."""
-    area = sum(0.5 * covered_angle(s) * min(s.range_max, LONGEST_M) ** 2 for s in scans)
-    return area >= _ENOUGH_M2
+    return covered_m2(scans) >= _ENOUGH_M2
+
+
+def covered_m2(scans: Sequence[LaserScan]) -> float:
+    """Return the area that sensors cover in an open space, m²."""
+    return sum(0.5 * covered_angle(s) * min(s.range_max, LONGEST_M) ** 2 for s in scans)

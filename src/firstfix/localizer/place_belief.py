@@ -20,6 +20,7 @@ from firstfix.belief.belief import (
 )
 from firstfix.belief.config import BeliefConfig
 from firstfix.belief.hints import Source
+from firstfix.belief.judge import MOST_MISSED
 from firstfix.belief.view import View
 from firstfix.core.estimate import Hypothesis, Verdict
 from firstfix.core.scan import Scans, as_scans
@@ -113,7 +114,8 @@ class PlaceBelief:
     def is_decided_by_evidence(self) -> bool:
         """True if the most likely place is sure with all priors left out."""
         shares = self.belief.evidence
-        return len(shares) > 0 and bool(shares[0] >= self._config.sure_probability)
+        least = self._config.sure_probability * (1.0 - MOST_MISSED)
+        return len(shares) > 0 and bool(shares[0] >= least)
 
     def choice_in_words(self, source: str) -> str:
         """Say who chose a pose, and that the scans have not decided."""
@@ -241,8 +243,10 @@ class PlaceBelief:
             return Support.SAME_PLACE
         is_sure_elsewhere = self.belief.verdict is Verdict.UNIQUE
         share = float(self.belief.probabilities[here].sum())
-        is_unlikely = share < _WITHDRAWN_SHARE
-        is_against = is_unlikely and self.belief.elsewhere < 0.5
+        # Of what is held: that a place was missed speaks neither for the pose nor against it.
+        held = self.belief.held
+        is_unlikely = share < _WITHDRAWN_SHARE * held
+        is_against = is_unlikely and self.belief.elsewhere < 1.0 - 0.5 * held
         self._views_against = self._views_against + 1 if is_against else 0
         is_lost = is_unlikely and fit is Fit.DOUBTFUL
         self._views_lost = self._views_lost + 1 if is_lost else 0
