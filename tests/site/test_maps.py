@@ -40,9 +40,13 @@ def test_unseen_cells_are_kept(tmp_path: Path) -> None:
     # Thresholds that turn grey 205, which is unknown, into free.
     path.write_text(path.read_text().replace("free_thresh: 0.196", "free_thresh: 0.25"))
     for _ in range(2):
-        found = prepared(SiteMap("map", path), tmp_path / "cache").fields.grid
+        fields = prepared(SiteMap("map", path), tmp_path / "cache").fields
+        found, read = fields.grid, load_map(path)
         assert found.unseen is not None
-        np.testing.assert_array_equal(found.seen_free, load_map(path).seen_free)
+        np.testing.assert_array_equal(found.seen_free, read.seen_free)
+        np.testing.assert_array_equal(fields.unknown, read.unknown)
+    # It was mapped from its file: a site would else hold a copy of every map.
+    assert "unknown" not in vars(found)
 
 
 def test_memory_stays_within_the_limit_whatever_is_asked(folder: Path, tmp_path: Path) -> None:

@@ -108,6 +108,13 @@ class MapFields:
         return manhattan_distance(self.grid.occupied)
 
     @cached_property
+    def unknown(self) -> NDArray[np.bool_]:
+        """Unknown cells as `OccupancyGrid.unknown`, from the folder if the content has a name."""
+        if not self.key:  # a hash of walls and free cells does not tell them
+            return self.grid.unknown
+        return self._kept("unknown", lambda: self.grid.unknown)
+
+    @cached_property
     def positions(self) -> SearchGrid:
         """The positions of the search."""
         return SearchGrid.unpacked(

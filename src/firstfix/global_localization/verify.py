@@ -202,7 +202,7 @@ def _compared(
         fields.clearance,
         fields.squares,
         fields.distances * np.float32(fields.grid.resolution),
-        fields.grid.unknown,
+        fields.unknown,
         fields.changed,
         fields.grid.resolution,
         scores,

@@ -31,7 +31,7 @@ from firstfix.site.views import search_views
 MEMORY_LIMIT = 2 << 30
 """Default size of the prepared maps that are held at once, bytes."""
 
-FIELDS = ("squares", "clearance", "endpoints", "look")
+FIELDS = ("squares", "clearance", "unknown", "endpoints", "look")
 """What the search reads of a prepared map."""
 
 # Places that may turn out to be one: only of these the surroundings are compared.

@@ -50,7 +50,7 @@ def surroundings(fields: MapFields, T_map_base: SE2) -> NDArray[np.uint8]:
     cell = rows[inside], columns[inside]
     # A wall may be one cell thick: it counts where it is within half a diagonal.
     near = fields.distances[fields.squares[cell]] * grid.resolution <= STEP_M * np.sqrt(0.5)
-    sampled[inside] = np.where(near, WALL, np.where(grid.unknown[cell], UNKNOWN, FREE))
+    sampled[inside] = np.where(near, WALL, np.where(fields.unknown[cell], UNKNOWN, FREE))
     return sampled
 
 
