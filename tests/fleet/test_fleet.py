@@ -13,7 +13,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fleet import fleet as fleet_module
 from firstfix.fleet.engine import WorkerLostError
 from firstfix.fleet.fleet import Fleet, NotReadyError, UnknownMapError
-from firstfix.fleet.jobs import Prepare, ShardedSite, parts_for, run_job, spread
+from firstfix.fleet.jobs import Prepare, ShardedSite, open_map, parts_for, run_job, spread
 from firstfix.io.maps.site_yaml import read_site
 from firstfix.site.query import SiteQuery
 
@@ -98,6 +98,33 @@ def test_queries_go_to_the_copy_that_has_least_to_do(
 
     assert asyncio.run(drive()) == ["first", "second"]
     assert set(asked) == set(range(2 * len(fleet.shards)))
+
+
+def test_a_known_map_is_searched_where_it_is_held(
+    here: tuple[Here, Fleet], rooms: Path, tmp_path: Path
+) -> None:
+    engine, fleet = here
+    asyncio.run(fleet.prepare())
+    asked: list[tuple[str, str]] = []
+    losses = [True, False, False]
+
+    async def on_map(map_id: str, job: Any) -> Any:
+        asked.append((map_id, type(job).__name__))
+        if losses.pop(0):
+            raise WorkerLostError
+        return run_job(job, open_map(rooms, map_id, tmp_path))
+
+    query = SiteQuery.of(scan_of("second", POSE))
+    by_owner = asyncio.run(fleet.locate(query, "second"))
+    fleet.on_map = on_map
+    engine.losses = [lambda _: True] * 100  # the workers are not asked
+    found = asyncio.run(fleet.locate(query, "second"))
+    assert asked == [("second", "Search")] * 2, "again after a loss"
+    assert (found.map_id, found.searched) == ("second", ("second",))
+    assert found.best is not None
+    assert by_owner.best is not None
+    assert found.best.pose == by_owner.best.pose
+    assert asyncio.run(fleet.locate(query, "first")).map_id != "second"
 
 
 def test_a_lost_job_is_given_again(here: tuple[Here, Fleet]) -> None:

@@ -156,6 +156,10 @@ def test_ray_serve_has_the_same_service(
             assert http.post("/v1/locate", json=body).status_code == 401
             found = http.post("/v1/locate", json=body, headers=bearer).json()
             assert (found["verdict"], found["map_id"]) == ("UNIQUE", "second")
+            for room in ("second", "first", "second"):  # by the replica that holds the map
+                body = {"scans": [as_message(scan_of(room, POSE))], "map": room}
+                found = http.post("/v1/locate", json=body, headers=bearer).json()
+                assert (found["verdict"], found["map_id"], found["searched"]) == ("UNIQUE", room, 1)
             refused = http.post("/v1/locate", json={}, headers=bearer)
             assert refused.headers["content-type"] == "application/problem+json"
     finally:

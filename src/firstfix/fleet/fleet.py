@@ -6,19 +6,22 @@ import asyncio
 import contextlib
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from functools import partial
+from typing import Any, TypeVar
 
 from firstfix.core.errors import InputError
 from firstfix.fleet.engine import Engine, WorkerLostError
-from firstfix.fleet.jobs import Job, Look, Prepare, Search, WarmUp
+from firstfix.fleet.jobs import Done, Job, Look, Prepare, Search, WarmUp
 from firstfix.site.judge import judge_site
-from firstfix.site.look import Looked
+from firstfix.site.look import Looked, look_at_all
 from firstfix.site.query import SiteQuery
 from firstfix.site.result import SiteResult
 
 T = TypeVar("T")
+
+OnMap = Callable[[str, Job[Any]], Awaitable[Done[Any]]]
 
 PAUSES_S = (0.0, 0.2, 1.0, 3.0, 8.0)
 """Before each trial of a job whose worker was lost. A process is back within seconds; a Ray cluster
@@ -59,6 +62,8 @@ class Fleet:
         Jobs that were lost with their worker.
     warm : set of int
         Workers that have compiled or loaded their kernels.
+    on_map : callable, optional
+        Does a job with one map, by its id; by default the worker that has the map does.
     """
 
     engine: Engine
@@ -70,6 +75,7 @@ class Fleet:
     cpu_s: dict[int, float] = field(default_factory=dict)
     lost_jobs: int = 0
     warm: set[int] = field(default_factory=set)
+    on_map: OnMap | None = None
     _running: Counter[int] = field(default_factory=Counter)
 
     @property
@@ -117,11 +123,18 @@ class Fleet:
         copy = min(range(self.copies), key=lambda i: self._running[i])
         self._running[copy] += 1
         try:
-            looked = await self._all(copy, [(i, Look(query, names)) for i, names in parts])
+            if only is None:
+                looked = await self._all(copy, [(i, Look(query, names)) for i, names in parts])
+            else:
+                looked = [look_at_all((only,))]
             promising = set(Looked.joined(looked).promising)
             chosen = [(i, tuple(n for n in names if n in promising)) for i, names in parts]
             searches = [(i, Search(query, names)) for i, names in chosen if names]
-            found = await self._all(copy, searches)
+            if only is not None and self.on_map is not None:
+                done = await self._again(partial(self.on_map, only, Search(query, (only,))))
+                found = [done.result]
+            else:
+                found = await self._all(copy, searches)
         finally:
             self._running[copy] -= 1
         result = await asyncio.to_thread(judge_site, query, looked, found)
@@ -182,15 +195,18 @@ class Fleet:
         return list(await asyncio.gather(*(self._ask(first + part, job) for part, job in asked)))
 
     async def _ask(self, worker: int, job: Job[T]) -> T:
+        done = await self._again(partial(self.engine.ask, worker, job))
+        self.memory[worker], self.cpu_s[worker] = done.memory, done.cpu_s
+        return done.result
+
+    async def _again(self, ask: Callable[[], Awaitable[Done[T]]]) -> Done[T]:
+        """Ask again while the worker is lost."""
         for pause in PAUSES_S:
             await asyncio.sleep(pause)
             try:
-                done = await self.engine.ask(worker, job)
+                return await ask()
             except WorkerLostError:
                 self.lost_jobs += 1
-                continue
-            self.memory[worker], self.cpu_s[worker] = done.memory, done.cpu_s
-            return done.result
         raise NotReadyError(
             "A part of the maps cannot be reached: its worker was lost and is started again. "
             "Try again later."

@@ -137,6 +137,21 @@ class ShardedSite:
         return Site(type(described)(maps), self.cache_dir, self.memory_limit)
 
 
+def open_map(path: Path, map_id: str, cache_dir: Path) -> Site:
+    """Open a site of one map, and prepare it.
+
+    Raises
+    ------
+    InputError
+        If the site has no such map.
+    """
+    described = read_site(path)
+    maps = tuple(entry for entry in described.maps if entry.id == map_id)
+    site = Site(type(described)(maps), cache_dir)
+    site.prepare_map(map_id)
+    return site
+
+
 def spread(maps: Sequence[SiteMap], workers: int) -> tuple[tuple[str, ...], ...]:
     """Spread maps over workers, so that each gets about the same size of images.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+from collections.abc import Awaitable
 from typing import TypeVar
 
 # Ray reads it when it is imported: firstfix tells nobody that it is used.
@@ -66,15 +67,7 @@ class RayEngine:
 
     async def ask(self, worker: int, job: Job[T]) -> Done[T]:
         """Let a worker do a job (`Engine.ask`)."""
-        try:
-            done: Done[T] = await self._actors[worker].run.remote(job)
-        except RayTaskError as error:
-            if isinstance(error.cause, FirstfixError):
-                raise error.cause from None
-            raise
-        except RayError as error:
-            raise WorkerLostError from error
-        return done
+        return await answer_of(self._actors[worker].run.remote(job))
 
     def close(self) -> None:
         """End all actors, and leave the cluster, or end it if it was started here."""
@@ -83,6 +76,26 @@ class RayEngine:
         self._actors = []
         if not self._is_guest:
             ray.shutdown()
+
+
+async def answer_of(running: Awaitable[Done[T]]) -> Done[T]:
+    """Wait for a job in the cluster.
+
+    Raises
+    ------
+    WorkerLostError
+        If its process ended.
+    InputError
+        If the query cannot be answered.
+    """
+    try:
+        return await running
+    except RayTaskError as error:
+        if isinstance(error.cause, FirstfixError):
+            raise error.cause from None
+        raise
+    except RayError as error:
+        raise WorkerLostError from error
 
 
 def _connect(address: str | None, workers: int) -> None:
