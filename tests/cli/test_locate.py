@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from firstfix.cli.answer import answer_text
+from firstfix.cli.answer import Waited, answer_text
 from firstfix.core.estimate import Evidence, Hypothesis, LocateResult, SearchReport, Verdict
 from firstfix.core.se2 import SE2
 
@@ -84,7 +84,9 @@ def test_places_that_are_not_likely_at_all_are_not_listed(
         for i, p in enumerate(probabilities)
     )
     search = SearchReport(poses=10, searched=1.0, proven=True)
-    text = answer_text(LocateResult(Verdict.AMBIGUOUS, "why", places, search, 0.01), None, 0.2)
+    text = answer_text(
+        LocateResult(Verdict.AMBIGUOUS, "why", places, search, 0.01), None, Waited(0.5, 0.2)
+    )
     assert max(0, text.count("\n| ") - 2) == rows  # head and rule
     assert (f"and {rest} less likely ones" in text) == (rest > 0)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import typer
@@ -21,9 +22,21 @@ VERDICT_STYLES = {"UNIQUE": "bold green", "AMBIGUOUS": "bold yellow", "NO_MATCH"
 _HEAD = ["rank", "x m", "y m", "yaw °", "probability", "score", "explained", "through wall"]
 
 
-def print_answer(
-    result: LocateResult, truth: SE2 | None, prepared_s: float, title: str = ""
-) -> None:
+@dataclass(frozen=True)
+class Waited:
+    """How long it took until the search began, s."""
+
+    kernels_s: float
+    map_s: float
+
+    def __str__(self) -> str:
+        """Return both times, with what they were needed for."""
+        return (
+            f"{self.kernels_s:.3f} s to load the kernels and {self.map_s:.3f} s to prepare the map"
+        )
+
+
+def print_answer(result: LocateResult, truth: SE2 | None, waited: Waited, title: str = "") -> None:
     """Print the answer for one scan.
 
     Parameters
@@ -32,32 +45,30 @@ def print_answer(
         The answer.
     truth : SE2 or None
         The true ``T_map_base``, where it is known.
-    prepared_s : float
-        Time that the preparation of the map took, s.
+    waited : Waited
+        Time before the search.
     title : str
         Before the verdict.
     """
     if sys.stdout.isatty():
-        _print_in_colour(result, truth, prepared_s, title)
+        _print_in_colour(result, truth, waited, title)
     else:
-        typer.echo(f"{title}{answer_text(result, truth, prepared_s)}")
+        typer.echo(f"{title}{answer_text(result, truth, waited)}")
 
 
-def answer_text(result: LocateResult, truth: SE2 | None, prepared_s: float) -> str:
+def answer_text(result: LocateResult, truth: SE2 | None, waited: Waited) -> str:
     """Describe an answer in lines of plain text. Parameters as in `print_answer`."""
     from firstfix.lab.reports.text import markdown_table
 
     lines = [f"{result.verdict.value}: {result.reason}"]
-    lines += [f"{name:<13}{text}" for name, text in _facts(result, truth, prepared_s)]
+    lines += [f"{name:<13}{text}" for name, text in _facts(result, truth, waited)]
     listed = _listed(result)
     if len(result.hypotheses) > 1:
         lines += ["", markdown_table(_HEAD, _cells(listed)).rstrip()]
     return "\n".join([*lines, *_rest(result, listed)])
 
 
-def _print_in_colour(
-    result: LocateResult, truth: SE2 | None, prepared_s: float, title: str
-) -> None:
+def _print_in_colour(result: LocateResult, truth: SE2 | None, waited: Waited, title: str) -> None:
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -67,12 +78,12 @@ def _print_in_colour(
     verdict = Text(result.verdict.value, VERDICT_STYLES[result.verdict.value])
     console.print(Text.assemble(title, verdict, f"  {result.reason}"))
     facts = Table.grid(padding=(0, 2))
-    for name, text in _facts(result, truth, prepared_s):
+    for name, text in _facts(result, truth, waited):
         facts.add_row(Text(name, "dim"), text)
     console.print(facts)
     listed = _listed(result)
     if len(result.hypotheses) > 1:
-        table = Table(box=box.SIMPLE_HEAD)
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
         for name in _HEAD:
             table.add_column(name, justify="right", no_wrap=True)
         for cells in _cells(listed):
@@ -82,7 +93,7 @@ def _print_in_colour(
         console.print(line)
 
 
-def _facts(result: LocateResult, truth: SE2 | None, prepared_s: float) -> list[tuple[str, str]]:
+def _facts(result: LocateResult, truth: SE2 | None, waited: Waited) -> list[tuple[str, str]]:
     import numpy as np
 
     from firstfix.core.pose_error import PoseError
@@ -106,7 +117,7 @@ def _facts(result: LocateResult, truth: SE2 | None, prepared_s: float) -> list[t
     return [
         *facts,
         ("search", f"{search.poses:,} poses, {search.searched:.0%} searched, {proof}"),
-        ("time", f"{result.elapsed_s:.3f} s, after {prepared_s:.3f} s to prepare the map"),
+        ("time", f"{result.elapsed_s:.3f} s, after {waited}"),
     ]
 
 

@@ -146,8 +146,9 @@ def _tried_kernels() -> str:
     from firstfix.amcl.config import AmclConfig, SensorModel
     from firstfix.core.se2 import SE2
     from firstfix.fields.kernel_cache import kernel_folder
+    from firstfix.global_localization.precompile import scan_of, small_room
     from firstfix.global_localization.scan_matcher import ScanMatcher
-    from firstfix.localizer.precompile import precompile, scan_of, small_room
+    from firstfix.localizer.precompile import precompile
 
     start = time.perf_counter()
     for model in SensorModel:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from firstfix.cli.answer import print_answer
+from firstfix.cli.answer import Waited, print_answer
 from firstfix.cli.known_changes import KnownChanges, load_changed_map
 from firstfix.cli.prior_options import NearPoses, Radius, RegionText, prior_of
 from firstfix.cli.progress import progress, working
@@ -83,11 +83,14 @@ def locate(
     with working("preparing the map"):
         # Imported after the files are read, so that bad input is refused at once.
         from firstfix.fields.cache import cache_folder
+        from firstfix.global_localization.precompile import precompile_search
         from firstfix.global_localization.scan_matcher import ScanMatcher
 
         began = time.perf_counter()
+        precompile_search(method)
+        loaded = time.perf_counter()
         matcher = ScanMatcher(grid, method=method, cache_dir=cache_folder())
-        prepared_s = time.perf_counter() - began
+        waited = Waited(loaded - began, time.perf_counter() - loaded)
     # On a terminal the answers themselves show how far it is.
     with progress(0 if sys.stdout.isatty() else len(chosen), "locating") as done:
         for i in chosen:
@@ -96,7 +99,7 @@ def locate(
             if as_lines:
                 typer.echo(json.dumps(result.to_dict(i, truth), allow_nan=False))
             else:
-                print_answer(result, truth, prepared_s, f"scan {i}: " if every else "")
+                print_answer(result, truth, waited, f"scan {i}: " if every else "")
             done(result.verdict.value)
     if plot is not None:
         from firstfix.plots.result_picture import draw_result

@@ -11,8 +11,8 @@ from typing import Generic, Protocol, TypeVar
 
 from firstfix.core.errors import FirstfixError
 from firstfix.core.se2 import SE2
+from firstfix.global_localization.precompile import scan_of, small_room
 from firstfix.io.maps.site_yaml import SiteMap, read_site
-from firstfix.localizer.precompile import scan_of, small_room
 from firstfix.site.look import Looked
 from firstfix.site.places import SiteCandidates
 from firstfix.site.query import SiteQuery

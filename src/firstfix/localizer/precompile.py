@@ -8,25 +8,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-import numpy as np
-
 from firstfix.amcl.config import AmclConfig
-from firstfix.core.angles import FULL_TURN
-from firstfix.core.grid import FREE, OCCUPIED, OccupancyGrid
+from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Odometry
-from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
-from firstfix.fields.raycast import expected_ranges
 from firstfix.global_localization.beams import usable_beams
 from firstfix.global_localization.config import MAX_POSES, Method
 from firstfix.global_localization.look import find_places
-from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.global_localization.precompile import precompile_search, scan_of, small_room
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.inputs import NewMap, PoseHint, Reset
 from firstfix.localizer.localizer import Localizer
-
-RANGE_MAX = 12.0
 
 # The robot is found at the first pose, tracked there, lost and found again at the second.
 _HERE, _THERE = SE2(3.0, 2.5, 0.4), SE2(6.0, 4.5, 2.0)
@@ -61,7 +54,7 @@ def precompile(config: AmclConfig | None = None, methods: Iterable[Method] = ())
         localizer.handle(replace(scan_of(grid, at), stamp=stamp))
     _search_again(localizer, grid)
     for method in methods:
-        ScanMatcher(grid, method=method).locate(scan_of(grid, _HERE))
+        precompile_search(method)
     _search_as_in_a_large_map(grid)
 
 
@@ -77,23 +70,3 @@ def _search_again(localizer: Localizer, grid: OccupancyGrid) -> None:
 def _search_as_in_a_large_map(grid: OccupancyGrid) -> None:
     beams = usable_beams(scan_of(grid, _HERE))
     find_places(beams, MapFields(grid, most_positions=0), 1, MAX_POSES)
-
-
-def small_room() -> OccupancyGrid:
-    """Return a room of 8 x 6 m with a pillar and a cut corner, its corner at the origin.
-
-    One scan is enough to find a robot there, so that a short story also tracks it.
-    """
-    cells = np.full((120, 160), FREE, np.int8)
-    cells[[0, -1], :] = cells[:, [0, -1]] = OCCUPIED
-    cells[30:50, 100:120] = OCCUPIED
-    cells[80:, :50] = OCCUPIED
-    return OccupancyGrid(cells, 0.05)
-
-
-def scan_of(grid: OccupancyGrid, T_map_base: SE2) -> LaserScan:
-    """Return the scan of a perfect sensor with 180 beams all round."""
-    bearings = np.linspace(-FULL_TURN / 2, FULL_TURN / 2, 180, endpoint=False)
-    ranges = expected_ranges(grid, T_map_base, bearings, RANGE_MAX).astype(np.float32)
-    step = float(bearings[1] - bearings[0])
-    return LaserScan(ranges, float(bearings[0]), step, range_min=0.1, range_max=RANGE_MAX)
