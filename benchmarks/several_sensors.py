@@ -1,6 +1,6 @@
 """The localizer with a depth camera that turns, two lasers at 40 Hz, and scans that are skewed.
 
-    python benchmarks/several_sensors.py turn --buildings office floor:3 --places 20
+    python benchmarks/several_sensors.py turn --buildings office floor-40 hall --places 8
     python benchmarks/several_sensors.py turn --cases ../shared/cases/fr079
     python benchmarks/several_sensors.py rate
     python benchmarks/several_sensors.py skew
@@ -22,6 +22,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from priors import building
 
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.odometry import Odometry
@@ -32,10 +33,12 @@ from firstfix.core.trajectory import Trajectory
 from firstfix.global_localization.places import is_same_place
 from firstfix.lab.experiments.case import Case, SensorCut, find_cases, truth_at
 from firstfix.lab.simulation.floor import Floor
+from firstfix.lab.simulation.furniture import furnished
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.simulation.rigs import RIGS
 from firstfix.lab.simulation.sweep import sweep
 from firstfix.lab.worlds.catalog import random_free_poses, world_or_map
+from firstfix.lab.worlds.drawing import Drawing
 from firstfix.localizer.config import LocalizerConfig, ScansConfig
 from firstfix.localizer.inputs import NewMap
 from firstfix.localizer.localizer import Localizer
@@ -61,21 +64,32 @@ def main() -> None:
             print(case.name, recorded_turns(case), flush=True)
         return
     for name in arguments.buildings:
-        grid = world_or_map(name)
         if arguments.what == "turn":
-            print(name, turning(grid, arguments.places), flush=True)
-        elif arguments.what == "rate":
+            grid, world = hall() if name == "hall" else building(name)
+            print(name, turning(grid, world, arguments.places), flush=True)
+            continue
+        grid = world_or_map(name)
+        if arguments.what == "rate":
             print(name, two_lasers(grid), flush=True)
         else:
             print(name, flush=True)
             skewed(grid)
 
 
-def turning(grid: OccupancyGrid, places: int) -> str:
+def hall() -> tuple[OccupancyGrid, OccupancyGrid]:
+    """Return the map of a hall, and the hall with three new boxes."""
+    plan = Drawing(9.0, 7.0, 0.05, 0.5)
+    plan.room(0.0, 0.0, 9.0, 7.0)
+    plan.solid(0.1, 5.0, 2.0, 6.9)
+    plan.solid(6.0, 2.0, 6.5, 3.5)
+    return plan.grid(), furnished(plan.grid(), 3, np.random.default_rng(0))
+
+
+def turning(grid: OccupancyGrid, world: OccupancyGrid, places: int) -> str:
     """Turn a depth camera once in place."""
     rng, rig = np.random.default_rng(1), RIGS["depth-camera"]
     found = wrong = 0
-    for truth in random_free_poses(grid, rng, places, 0.5):
+    for truth in random_free_poses(world, rng, places, 0.4):
         localizer = Localizer()
         localizer.handle(NewMap(0.0, grid))
         for k in range(round(2.0 * math.pi / TURN_RAD_S * HZ) + 1):
@@ -83,7 +97,7 @@ def turning(grid: OccupancyGrid, places: int) -> str:
             pose = truth @ SE2(0.0, 0.0, turned)
             localizer.handle(Odometry(stamp, SE2(0.0, 0.0, ODOMETRY_TURN * turned)))
             outputs = [
-                o for scan in rig.scans(grid, pose, rng, stamp) for o in localizer.handle(scan)
+                o for scan in rig.scans(world, pose, rng, stamp) for o in localizer.handle(scan)
             ]
             first = next((o for o in outputs if isinstance(o, InitialPose)), None)
             if first is not None:
