@@ -68,3 +68,8 @@ def test_invalid_parameters_are_refused_by_name(bad):
 
 def test_particle_clouds_can_be_switched_off():
     assert NodeConfig(cloud_rate=0).cloud_rate == 0.0
+
+
+def test_changes_are_of_one_map():
+    with pytest.raises(InputError, match="a site has many"):
+        NodeConfig(site="campus", changes_layer="changes.yaml")

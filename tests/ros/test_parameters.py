@@ -70,6 +70,9 @@ TEXTS = {
     "height_band": ("0.1 1.8", "0 2"),
     "laser_pose": ("", "a=1,0,0 b=0,0,0,3.14"),
     "zones": ("",),
+    # Not with a map file, nor with changes of one map; the service only with a site.
+    "site": ("",),
+    "load_map_service": ("",),
 }
 
 
