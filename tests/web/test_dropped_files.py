@@ -31,6 +31,8 @@ from firstfix.web.messages import LocatedFiles
 
 HOUSE = WORLDS["house"]()
 POSES = random_free_poses(HOUSE, np.random.default_rng(5), 3)
+# Longer than the limits of the server: its answer is judged, not the patience of the client.
+PATIENCE_S = 240.0
 BINARY = {"content-type": "application/octet-stream"}
 
 
@@ -48,7 +50,10 @@ def folder(tmp_path: Path) -> Path:
 def api() -> Iterator[httpx.Client]:
     begun = drive("house")
     begun.step(22)
-    with fed(store=begun.store) as site, httpx.Client(base_url=site.url, timeout=60.0) as client:
+    with (
+        fed(store=begun.store) as site,
+        httpx.Client(base_url=site.url, timeout=PATIENCE_S) as client,
+    ):
         yield client
 
 
