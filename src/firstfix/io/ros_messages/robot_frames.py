@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from firstfix.core.odometry import Odometry
 from firstfix.core.se2 import SE2
 from firstfix.io.ros_messages.incoming import StampedTransform
-from firstfix.io.ros_messages.sensor_place import SensorPlace, place_of
 from firstfix.io.ros_messages.tf_buffer import LookupFailure, TransformBuffer
 from firstfix.io.ros_messages.transforms import flat
 
@@ -194,31 +193,6 @@ class RobotFrames:
     def sensor_at(self, frame: str, stamp: float) -> NDArray[np.float64] | LookupFailure:
         """Look up the pose of a sensor on the robot, shape (4, 4), at the stamp of its message."""
         return self._tf.at(self._base, frame, stamp)
-
-    def laser_at(self, frame: str, stamp: float) -> SensorPlace | LookupFailure:
-        """Look up the pose of a laser on the floor plan of the robot.
-
-        Parameters
-        ----------
-        frame : str
-            Its frame.
-        stamp : float
-            Stamp of its scan, s.
-
-        Returns
-        -------
-        SensorPlace or LookupFailure
-            The pose, or the reason why it is unknown.
-
-        Raises
-        ------
-        ScanError
-            If its scan plane is not level.
-        """
-        T_base_laser = self.sensor_at(frame, stamp)
-        if isinstance(T_base_laser, LookupFailure):
-            return T_base_laser
-        return place_of(frame, T_base_laser)
 
     def _at(self, stamp: float) -> list[Odometry]:
         T_odom_base = np.eye(4)
