@@ -20,6 +20,7 @@ from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS
 from firstfix.global_localization.config import LocateConfig, Method
 from firstfix.global_localization.exhaustive import BASIC, FAST, ExhaustiveSearch
+from firstfix.global_localization.lead import leads_without_its_best_part
 from firstfix.global_localization.look import find_places
 from firstfix.global_localization.places import distinct_places
 from firstfix.global_localization.prior import (
@@ -33,6 +34,7 @@ from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.scoring import score_poses, search_locally
 from firstfix.global_localization.searchable import check_positions, check_searchable
 from firstfix.global_localization.sensors import (
+    are_surrounded,
     at_one_time,
     instants,
     joint_beams,
@@ -58,6 +60,15 @@ _LISTED_SHARE = 0.01
 _SEES_TOO_LITTLE = (
     "but one scan of a sensor with this field of view and range is not enough to be sure: "
     "drive half a metre or turn, and give several scans"
+)
+
+
+# Places, the best one included, among which it must lead clearly.
+_RIVALS = 8
+
+_DIFFERS_IN_LITTLE = (
+    "but only by one or two things, which may have been moved: "
+    "drive or turn, and give several scans"
 )
 
 
@@ -285,9 +296,12 @@ def locate(
         for i, probability in zip(ranked, probabilities, strict=True)
     )
     verdict, reason = _judge(verification, ranked, probabilities, report, config)
-    sure = see_enough(scans) or known.speaks_for(poses[ranked[0]])  # a prior is a second witness
-    if verdict is Verdict.UNIQUE and not sure:
-        verdict, reason = Verdict.AMBIGUOUS, f"{reason}, {_SEES_TOO_LITTLE}"
+    # A prior is a second witness.
+    if verdict is Verdict.UNIQUE and not known.speaks_for(poses[ranked[0]]):
+        if not (see_enough(scans) or are_surrounded(scans)):
+            verdict, reason = Verdict.AMBIGUOUS, f"{reason}, {_SEES_TOO_LITTLE}"
+        elif not leads_without_its_best_part(poses[ranked[:_RIVALS]], beams, fields):
+            verdict, reason = Verdict.AMBIGUOUS, f"{reason}, {_DIFFERS_IN_LITTLE}"
     result = LocateResult(verdict, reason, hypotheses, report, 0.0, scans=tuple(scans))
     if prior is not None:
         by_scan = distinct_places(poses, verification.scores, resolution, config.hypotheses)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -22,6 +23,12 @@ _SAME_DIRECTION_RAD = 0.1
 # cut to smaller sensors, are wrong in 0.3 % at 360 degrees x 8 m (201 m²), in 0.6 % at 180 degrees
 # x 8 m (100 m²), in 1.5 % at 360 degrees x 3.5 m (38 m²) and in 5 % at 60 degrees x 5 m (13 m²).
 _ENOUGH_M2 = 150.0
+
+# So does a scan of a sensor that covers a third of this, if it looks to all sides and has walls
+# around it: decisions/0005 has the measurements.
+_SMALLER_M2 = 50.0
+_ALL_SIDES_RAD = math.radians(200.0)
+_ENOUGH_CONTOUR_M = 6.0
 
 
 def at_one_time(scans: Sequence[LaserScan], T_odom_base: Sequence[SE2]) -> tuple[LaserScan, ...]:
@@ -144,6 +151,20 @@ def covered_angle(scan: LaserScan) -> float:
 def see_enough(scans: Sequence[LaserScan]) -> bool:
     """Tell whether sensors cover so much that one scan of each can be enough for UNIQUE."""
     return covered_m2(scans) >= _ENOUGH_M2
+
+
+def are_surrounded(scans: Sequence[LaserScan]) -> bool:
+    """Tell whether scans of smaller sensors show so much of the walls around that they can be, too.
+
+    The length of what a scan shows is the sum over its hits of range and angle between beams.
+    """
+    angle = sum(covered_angle(scan) for scan in scans)
+    contour = sum(
+        abs(scan.angle_increment) * float(scan.ranges[scan.hit].clip(max=LONGEST_M).sum())
+        for scan in scans
+    )
+    sides = angle >= _ALL_SIDES_RAD and contour >= _ENOUGH_CONTOUR_M
+    return sides and covered_m2(scans) >= _SMALLER_M2
 
 
 def covered_m2(scans: Sequence[LaserScan]) -> float:

@@ -180,14 +180,21 @@ def beam_classes(pose: NDArray[np.float64], beams: Beams, fields: MapFields) -> 
     return classes.reshape(-1)
 
 
+def beam_weights(beams: Beams) -> NDArray[np.float64]:
+    """Return the weight of each beam in the mean cost, shape (n,); their sum is 1."""
+    # Neighbouring beams on a near wall are redundant, far beams are not. The root lies between the
+    # same weight for every beam and the same weight for every metre of wall.
+    weights: NDArray[np.float64] = np.sqrt(beams.ranges)
+    weights *= np.where(beams.hit, 1.0, _NO_RETURN_WEIGHT)
+    weights /= weights.sum()
+    return weights
+
+
 def _compared(
     poses: NDArray[np.float64], used: Beams, fields: MapFields
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.uint8]]:
     """Return scores (n,), counts (n, 4) and classes (n, beams)."""
-    # Neighbouring beams on a near wall are redundant, far beams are not. The root lies between the
-    # same weight for every beam and the same weight for every metre of wall.
-    weights = np.sqrt(used.ranges) * np.where(used.hit, 1.0, _NO_RETURN_WEIGHT)
-    weights /= weights.sum()
+    weights = beam_weights(used)
     scores = np.empty(len(poses))
     counts = np.zeros((len(poses), 4), np.int64)
     classes = np.empty((len(poses), len(used)), np.uint8)
