@@ -41,7 +41,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.raycast import expected_ranges
 from firstfix.io.ros_messages.incoming import to_planar, to_pose
 from firstfix.io.ros_messages.outgoing import laser_scan, occupancy_grid, transforms
-from firstfix.localizer.precompile import small_room
+from firstfix.global_localization.precompile import small_room
 from firstfix.ros.channels import INITIAL_POSE, PARTICLES, STATUS, Channel
 from firstfix.ros.node import Node
 from firstfix.ros.node_config import NodeConfig

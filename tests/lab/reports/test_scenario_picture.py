@@ -8,9 +8,9 @@ import pytest
 
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
+from firstfix.global_localization.precompile import small_room
 from firstfix.lab.reports.scenario_picture import draw_scenario
 from firstfix.lab.scenarios.demo import DemoStep
-from firstfix.localizer.precompile import small_room
 
 
 def demo_steps() -> list[DemoStep]:
