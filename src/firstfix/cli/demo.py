@@ -72,7 +72,8 @@ def demo(
     check_path(picture)
     if not headless and (plot is not None or as_object):
         raise InputError(
-            f"{'--json' if plot is None else '--plot'} is of the fixed scenario. Add --headless."
+            f"{'--json' if plot is None else f'--plot {plot}'} is of the fixed scenario. Add "
+            "--headless."
         )
     grid = world_or_map(world)
     if headless:
