@@ -10,7 +10,7 @@ from firstfix.lab.worlds.towers import tower, write_tower
 
 @pytest.mark.slow
 def test_no_pose_on_a_wrong_floor(tmp_path):
-    floors = tower(1, 4, 400.0)
+    floors = tower(1, 5, 400.0)  # the fifth is like no other: there it begins
     folder = write_tower(tmp_path / "tower", floors)
     rides = list(ride_lifts(floors, folder, 2, 1, tmp_path / "cache", Teller.LIFT))
     assert len(rides) == 2
