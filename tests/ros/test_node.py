@@ -152,7 +152,8 @@ def test_it_can_be_stopped_before_between_and_after(run):
     running.receive(Channel.RESET)  # of a callback that came too late
 
 
-def test_stopping_waits_for_the_input_in_progress_and_starts_no_other(run, robot):
+def test_stopping_waits_for_the_input_in_progress_and_starts_no_other(run, robot, monkeypatch):
+    monkeypatch.setattr(node_module, "_STOP_S", 60.0)  # its limit is tested below
     running = run(mode=Mode.FULL)
     running.introduce(robot)
     for _ in range(200):

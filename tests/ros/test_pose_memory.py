@@ -284,6 +284,7 @@ class Life:
             mode=Mode.FULL,
             saved_pose_file=str(file),
             save_pose_rate=5.0,
+            scan_timeout=0.0,  # a busy machine may need longer than that between two scans
             **parameters,
         )
         self._node = Node(config, self.recorder, [self._watch])
@@ -387,5 +388,5 @@ def test_a_node_continues_where_poses_cannot_be_saved(ros2, hall_plan, tmp_path)
         for _ in range(6):
             life.look()
         assert life.state is State.LOCALIZED
-    (warning,) = life.recorder.logged(Severity.WARNING)
-    assert warning.startswith("the pose is not saved")
+    warnings = life.recorder.logged(Severity.WARNING)
+    assert [text.startswith("the pose is not saved") for text in warnings].count(True) == 1
