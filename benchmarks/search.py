@@ -30,8 +30,8 @@ from firstfix.global_localization import exhaustive
 from firstfix.global_localization import search as kernels
 from firstfix.global_localization.beams import Beams, usable_beams
 from firstfix.global_localization.config import LocateConfig
+from firstfix.global_localization.locate import locate
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
-from firstfix.global_localization.scan_matcher import locate
 from firstfix.global_localization.verify import verify
 from firstfix.io.logs.load import load_recording
 from firstfix.io.maps.map_server import load_map

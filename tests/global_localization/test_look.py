@@ -12,13 +12,13 @@ from firstfix.fields.look_table import LOOK_DIRECTIONS
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import usable_beams
 from firstfix.global_localization.config import MAX_POSES, LocateConfig
+from firstfix.global_localization.locate import locate
 from firstfix.global_localization.look import (
     BEAMS,
     find_places,
     look_at,
     look_into,
 )
-from firstfix.global_localization.scan_matcher import locate
 from firstfix.global_localization.search import SECTORS, search
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.house import house

@@ -14,8 +14,9 @@ from firstfix.core.estimate import Verdict
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.frames import bases_in_map, to_map
+from firstfix.global_localization.locate import _with_share_of_prior
 from firstfix.global_localization.prior import SHARE_WITHOUT_PRIOR, PlacePrior
-from firstfix.global_localization.scan_matcher import ScanMatcher, _with_share_of_prior
+from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.global_localization.verdict import log_likelihoods, with_prior
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.catalog import identical_rooms

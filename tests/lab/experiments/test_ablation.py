@@ -12,7 +12,7 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.config import LocateConfig
-from firstfix.global_localization.scan_matcher import locate
+from firstfix.global_localization.locate import locate
 from firstfix.lab.experiments.ablation import (
     AblatedMatcher,
     Without,

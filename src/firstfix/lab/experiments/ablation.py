@@ -25,14 +25,14 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS, Beams, usable_beams
 from firstfix.global_localization.config import LocateConfig
-from firstfix.global_localization.places import distinct_places
-from firstfix.global_localization.refine import refine_on_field, refine_on_rays
-from firstfix.global_localization.scan_matcher import (
+from firstfix.global_localization.locate import (
     FIRST_LOOK_BEAMS,
     LISTED_PLACES,
     SECOND_LOOK_PLACES,
     worth_listing,
 )
+from firstfix.global_localization.places import distinct_places
+from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.search import Candidates, search
 from firstfix.global_localization.verdict import judge, nothing_to_match, place_probabilities
 from firstfix.global_localization.verify import verified_place, verify
