@@ -12,7 +12,7 @@ from firstfix.fields.map_fields import MapFields
 from firstfix.fields.raycast import expected_ranges
 from firstfix.global_localization.beams import usable_beams
 from firstfix.global_localization.frames import to_cells
-from firstfix.global_localization.lead import leads_without_its_best_part
+from firstfix.global_localization.lead import leads_without_its_best_part, part_costs
 from firstfix.global_localization.sensors import are_surrounded
 
 CELL_M = 0.05
@@ -41,7 +41,7 @@ def scan_in(world: OccupancyGrid, pose: SE2, beams: int = 180, range_max: float 
 def is_ahead(world: OccupancyGrid, beams: int = 180) -> bool:
     scan = scan_in(world, LEFT, beams)
     poses = np.array([to_cells(world, scan, pose) for pose in (LEFT, RIGHT)])
-    return leads_without_its_best_part(poses, usable_beams(scan), MapFields(world))
+    return leads_without_its_best_part(part_costs(poses, usable_beams(scan), MapFields(world)))
 
 
 def test_one_small_thing_is_no_lead():
@@ -63,7 +63,7 @@ def test_a_place_without_a_rival_leads():
     world = two_rooms()
     scan = scan_in(world, LEFT)
     poses = np.array([to_cells(world, scan, LEFT)])
-    assert leads_without_its_best_part(poses, usable_beams(scan), MapFields(world))
+    assert leads_without_its_best_part(part_costs(poses, usable_beams(scan), MapFields(world)))
 
 
 def test_what_was_measured_counts_not_what_the_sensor_could_see():

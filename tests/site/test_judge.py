@@ -24,6 +24,9 @@ BEAMS = 360
 QUERY = SiteQuery.of(LaserScan(np.full(BEAMS, 3.0), -math.pi, 2 * math.pi / BEAMS, 0.1, 12.0))
 
 
+PARTS = 12
+
+
 def log_of(cost: float) -> float:
     best, wrong = log_likelihoods(np.array([cost, 2.3]), BEAMS)
     return float(best - wrong)
@@ -37,11 +40,20 @@ def place(
     content: str = "",
     floor: str | None = None,
     T_site_base: SE2 | None = None,
+    parts: tuple[float, ...] | None = None,
 ) -> SitePlace:
     hypothesis = Hypothesis(SE2(x, 0.0, 0.0), np.eye(3) * 1e-4, cost, 0.0, EVIDENCE, map_id=map_id)
     log = log_of(cost)
     return SitePlace(
-        hypothesis, log, 0.0, (log,), cost, T_site_base, content or map_id, (None, floor)
+        hypothesis,
+        log,
+        0.0,
+        (log,),
+        cost,
+        T_site_base,
+        content or map_id,
+        (None, floor),
+        (cost,) * PARTS if parts is None else parts,
     )
 
 
@@ -128,3 +140,13 @@ def test_surroundings_tell_an_edited_map_from_another_floor() -> None:
     assert show_the_same(ground, edited)
     assert not show_the_same(ground, first)
     assert not show_the_same(ground, np.zeros_like(ground))
+
+
+def test_a_place_ahead_by_one_thing_only_is_not_unique() -> None:
+    rival = place("b", 1.0)
+    ahead_everywhere = place("a", 0.4)
+    assert judged(ahead_everywhere, rival).verdict is Verdict.UNIQUE
+    by_one_thing = place("a", 0.4, parts=(0.0, 0.0, *(1.0,) * (PARTS - 2)))
+    result = judged(by_one_thing, rival)
+    assert result.verdict is Verdict.AMBIGUOUS
+    assert "may have been moved" in result.reason

@@ -14,7 +14,7 @@ from firstfix.core.scan import LaserScan
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS, Beams
 from firstfix.global_localization.config import LocateConfig
-from firstfix.global_localization.lead import leads_without_its_best_part
+from firstfix.global_localization.lead import RIVALS, leads_without_its_best_part, part_costs
 from firstfix.global_localization.look import find_places
 from firstfix.global_localization.places import distinct_places
 from firstfix.global_localization.prior import (
@@ -26,7 +26,9 @@ from firstfix.global_localization.prior import (
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.sensors import are_surrounded, joint_beams, see_enough
 from firstfix.global_localization.verdict import (
+    DIFFERS_IN_LITTLE,
     RIVAL_SHARE,
+    SEES_TOO_LITTLE,
     judge,
     log_likelihoods,
     nothing_to_match,
@@ -41,18 +43,6 @@ SECOND_LOOK_PLACES = 48
 # This many places are listed however unlikely, and all that are a hundredth as likely as the best.
 LISTED_PLACES = 10
 _LISTED_SHARE = 0.01
-
-# Places, the best one included, among which it must lead clearly.
-_RIVALS = 8
-
-_SEES_TOO_LITTLE = (
-    "but one scan of a sensor with this field of view and range is not enough to be sure: "
-    "drive half a metre or turn, and give several scans"
-)
-_DIFFERS_IN_LITTLE = (
-    "but only by one or two things, which may have been moved: "
-    "drive or turn, and give several scans"
-)
 
 
 def locate(
@@ -217,9 +207,9 @@ def _judge(
     if verdict is not Verdict.UNIQUE or known.speaks_for(places.poses[0]):
         return verdict, reason
     if not (see_enough(scans) or are_surrounded(scans)):
-        return Verdict.AMBIGUOUS, f"{reason}, {_SEES_TOO_LITTLE}"
-    if not leads_without_its_best_part(places.poses[:_RIVALS], beams, fields):
-        return Verdict.AMBIGUOUS, f"{reason}, {_DIFFERS_IN_LITTLE}"
+        return Verdict.AMBIGUOUS, f"{reason}, {SEES_TOO_LITTLE}"
+    if not leads_without_its_best_part(part_costs(places.poses[:RIVALS], beams, fields)):
+        return Verdict.AMBIGUOUS, f"{reason}, {DIFFERS_IN_LITTLE}"
     return verdict, reason
 
 

@@ -22,6 +22,16 @@ _DOUBTFUL_FIT = 0.6
 # Mean cost at which the best place of a wrong map begins to be as good as the right one.
 WRONG_MAP_COST = 2.3
 
+# Why one scan is not enough, after the reason for which it would be.
+SEES_TOO_LITTLE = (
+    "but one scan of a sensor with this field of view and range is not enough to be sure: "
+    "drive half a metre or turn, and give several scans"
+)
+DIFFERS_IN_LITTLE = (
+    "but only by one or two things, which may have been moved: "
+    "drive or turn, and give several scans"
+)
+
 # A place at least this fraction as likely as the best one is its rival.
 RIVAL_SHARE = 0.1
 

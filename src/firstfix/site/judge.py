@@ -18,10 +18,18 @@ from firstfix.belief.judge import (
 )
 from firstfix.core.estimate import Verdict
 from firstfix.core.scan import LaserScan
+from firstfix.global_localization.lead import RIVALS, leads_without_its_best_part
 from firstfix.global_localization.places import is_same_place
 from firstfix.global_localization.prior import NEAR_LOG
 from firstfix.global_localization.sensors import joint_beams, see_enough
-from firstfix.global_localization.verdict import EXPONENT, RIVAL_SHARE, judge, place_probabilities
+from firstfix.global_localization.verdict import (
+    DIFFERS_IN_LITTLE,
+    EXPONENT,
+    RIVAL_SHARE,
+    SEES_TOO_LITTLE,
+    judge,
+    place_probabilities,
+)
 from firstfix.site.look import Looked
 from firstfix.site.places import SiteCandidates, SitePlace
 from firstfix.site.query import SiteQuery
@@ -45,10 +53,6 @@ _NOTHING = (
     "range_max that do not fit it"
 )
 _NO_MAP = "no map of the site can be searched"
-_SEES_TOO_LITTLE = (
-    "but one scan of a sensor with this field of view and range is not enough to be sure: "
-    "drive half a metre or turn, and give several scans"
-)
 _SEEN_ONCE = (
     f"but this sensor needs a second view to be sure: drive {SECOND_LOOK_M} m or turn "
     f"{np.degrees(SECOND_LOOK_RAD):.0f}°"
@@ -159,9 +163,12 @@ def _judge_look(
     query: SiteQuery, places: Sequence[SitePlace], shares: NDArray[np.float64]
 ) -> tuple[Verdict, str]:
     verdict, reason = judge(shares[:, -1], places[0].hypothesis.evidence, UNIQUE_PROBABILITY)
-    is_enough = see_enough(query.scans) or _is_hinted(query, places[0])
-    if verdict is Verdict.UNIQUE and not is_enough:
-        return Verdict.AMBIGUOUS, f"{reason}, {_SEES_TOO_LITTLE}"
+    if verdict is not Verdict.UNIQUE or _is_hinted(query, places[0]):
+        return verdict, reason
+    if not see_enough(query.scans):
+        return Verdict.AMBIGUOUS, f"{reason}, {SEES_TOO_LITTLE}"
+    if not leads_without_its_best_part(np.array([p.part_costs for p in places[:RIVALS]])):
+        return Verdict.AMBIGUOUS, f"{reason}, {DIFFERS_IN_LITTLE}"
     return verdict, reason
 
 

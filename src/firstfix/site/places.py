@@ -33,6 +33,8 @@ class SitePlace:
         Hash of the map's cells: copies have the same.
     level : tuple of str or None
         Building and floor of the map.
+    part_costs : tuple of float
+        What each part of the scan costs (`lead.part_costs`); empty after several views.
     around : ndarray of uint8 or None
         What the map shows around the place (`surroundings`); None for unlikely places.
     """
@@ -45,6 +47,7 @@ class SitePlace:
     T_site_base: SE2 | None
     content: str
     level: tuple[str | None, str | None]
+    part_costs: tuple[float, ...] = ()
     around: NDArray[np.uint8] | None = None
 
     @property

@@ -13,6 +13,7 @@ from firstfix.core.estimate import Hypothesis
 from firstfix.core.scan import LaserScan
 from firstfix.global_localization.beams import FEWEST_HITS, Beams
 from firstfix.global_localization.frames import bases_in_map
+from firstfix.global_localization.lead import part_costs
 from firstfix.global_localization.look import look_into
 from firstfix.global_localization.places import distinct_places
 from firstfix.global_localization.prior import DEEPER
@@ -184,6 +185,7 @@ def _described(
     costs = verification.scores
     logs = log_likelihoods(np.append(costs, WRONG_MAP_COST), len(beams))
     before = prior_logs(query, map_id, bases_in_map(fields.grid, scan, poses))
+    parts = part_costs(poses, beams, fields).tolist()
     return [
         as_place(
             verified_place(fields.grid, scan, verification, i, covariances[i], 0.0),
@@ -192,6 +194,7 @@ def _described(
             float(before[i]),
             (float(logs[i] - logs[-1] + before[i]),),
             float(costs[i]),
+            tuple(parts[i]),
         )
         for i in distinct_places(poses, costs, fields.grid.resolution, LISTED_PLACES).tolist()
     ]
@@ -214,6 +217,7 @@ def as_place(
     prior_log: float,
     steps: tuple[float, ...],
     cost: float,
+    parts: tuple[float, ...] = (),
 ) -> SitePlace:
     """Return a place of a map with what the verdict needs to know of the map."""
     entry, pose = prepared.entry, hypothesis.pose
@@ -226,4 +230,5 @@ def as_place(
         T_site_base=None if entry.T_site_map is None else entry.T_site_map @ pose,
         content=prepared.content,
         level=(entry.building, entry.floor),
+        part_costs=parts,
     )
