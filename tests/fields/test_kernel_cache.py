@@ -63,7 +63,8 @@ def test_every_file_with_a_kernel_is_hashed():
             assert file in hashed
 
 
-def test_garbage_is_collected_again_after_a_kernel_was_compiled():
+def test_garbage_is_collected_again_after_a_kernel_was_compiled(monkeypatch, tmp_path):
+    monkeypatch.setattr(kernel_cache, "kernel_folder", lambda: tmp_path)  # no test was here before
     collects = []
 
     @kernel
