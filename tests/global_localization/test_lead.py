@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from firstfix.core.estimate import Verdict
 from firstfix.core.grid import FREE, OCCUPIED, OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
@@ -13,6 +14,7 @@ from firstfix.fields.raycast import expected_ranges
 from firstfix.global_localization.beams import usable_beams
 from firstfix.global_localization.frames import to_cells
 from firstfix.global_localization.lead import leads_without_its_best_part, part_costs
+from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.global_localization.sensors import are_surrounded
 
 CELL_M = 0.05
@@ -77,3 +79,18 @@ def test_what_was_measured_counts_not_what_the_sensor_could_see():
     assert not are_surrounded([half])
     other = LaserScan(half.ranges, np.pi, half.angle_increment, 0.05, 12.0)
     assert are_surrounded([half, other])
+
+
+@pytest.mark.parametrize(
+    ("size", "small"), [(0.5, Verdict.UNIQUE), (0.8, Verdict.AMBIGUOUS)], ids=["sure", "likely"]
+)
+def test_a_small_view_to_all_sides_must_be_surer_than_a_large_one(size, small):
+    world = two_rooms(
+        (0.5, 0.5, size, 0.6 * size),
+        (3.0, 0.3, 0.5, 1.2 * size),
+        (0.3, 3.0, 1.2 * size, 0.8),
+        (3.0, 3.2, 0.8 * size, 0.4),
+    )
+    matcher = ScanMatcher(world)
+    assert matcher.locate(scan_in(world, LEFT, range_max=5.0)).verdict is small
+    assert matcher.locate(scan_in(world, LEFT, range_max=12.0)).verdict is Verdict.UNIQUE
