@@ -138,7 +138,7 @@ class Robot:
         self._life = f"{seed}"
         self._clock_s = 0.0
         self._orders: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
-        next(Stand(1.0).play(self._wake(None, seed)))  # loads kernels before the clock starts
+        next(Stand(1.0).run(self._wake(None, seed)))  # loads kernels before the clock starts
         if is_elsewhere:
             self._mark("teleport")
 
