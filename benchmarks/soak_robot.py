@@ -152,7 +152,7 @@ class Robot:
 
     def live(self) -> None:
         """Run in real time until ROS ends it."""
-        T_base_laser = Scenario(()).lidar.T_base_laser
+        T_base_laser = Scenario(()).rig.lidars[0].T_base_laser
         self._wire.send("/tf_static", transforms(make, 0.0, BASE, LASER, T_base_laser), None)
         began = time.time() - self._simulation.stamp
         while not rospy.is_shutdown():
