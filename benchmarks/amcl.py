@@ -75,7 +75,7 @@ def time_update(
     belief = state.particles
     beams = select_beams(scan, config)
     print(f"\n{n} particles x {max_beams} beams, {len(beams.hits)} of them hit; {runs} runs")
-    show("whole update", runs, lambda: step(state, INCREMENT, scan, sensor, rng, config, never))
+    show("whole update", runs, lambda: step(state, INCREMENT, (scan,), sensor, rng, config, never))
     print(f"  memory over the process before: {peak_mb() - before:.0f} MB")
     show("propagate", runs, lambda: propagate(belief, INCREMENT, config, rng))
     show("choose beams", runs, lambda: select_beams(scan, config))
@@ -107,7 +107,7 @@ def numpy_twin(
     return total
 
 
-def never(_: LaserScan, n: int, __: np.random.Generator) -> NDArray[np.float64]:
+def never(_: tuple[LaserScan, ...], n: int, __: np.random.Generator) -> NDArray[np.float64]:
     raise AssertionError(f"{n} particles asked for although recovery is off")
 
 

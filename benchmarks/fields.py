@@ -51,7 +51,7 @@ def time_search_fields(grid: OccupancyGrid, runs: int) -> None:
     show(
         "table of expected ranges",
         runs,
-        lambda: build_range_table(fields.clearance, resolution, positions),
+        lambda: build_range_table(grid.occupied, fields.clearance, resolution, positions),
     )
     show("all fields of a map", runs, lambda: prepared(grid))
 

@@ -60,7 +60,7 @@ def main() -> None:
         f"{len(beams)} beams, {arguments.runs} runs, median (fastest)"
     )
     time_steps(beams, fields, arguments.runs)
-    show("locate", arguments.runs, lambda: locate(scan, fields, LocateConfig()))
+    show("locate", arguments.runs, lambda: locate([scan], fields, LocateConfig()))
     time_paper(beams, fields, arguments.runs)
 
 
