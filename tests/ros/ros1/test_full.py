@@ -84,7 +84,7 @@ def test_a_robot_that_is_carried_away_is_found_where_it_is_set_down(ros1: Lab) -
     for found in (again, followed):
         assert ros1.error_of(found).is_small
         assert abs(found["pose"][0] - before["pose"][0]) > 1.0
-    assert watcher.lines("localization_status")[-1]["state"] == "LOCALIZED"
+    watcher.wait_for("localization_status", state="LOCALIZED", after=lost["at"])
     assert "Traceback" not in follower.output + helper.output
 
 
