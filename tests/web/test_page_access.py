@@ -49,6 +49,7 @@ def test_the_page_reconnects_to_a_restarted_server(visit: Visitor, chromium: Any
     finally:
         server.stop()
     page.page.wait_for_selector("#connection-lost", state="visible")
+    page.page.close()  # it asks no more
     # The test stopped the server on purpose.
     page.problems = [problem for problem in page.problems if "net::ERR_CONNECTION" not in problem]
 
