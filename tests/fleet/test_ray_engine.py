@@ -32,6 +32,7 @@ pytestmark = [
 LOCAL = "127.0.0.1"
 POSE = SE2(3.9, 1.7, 0.6)
 BACK_S = 90.0
+HERE = {"node_ip_address": LOCAL, "include_dashboard": False}
 
 
 @pytest.fixture(scope="module")
@@ -43,13 +44,12 @@ def cluster() -> Iterator[Any]:
     os.environ.update(RAY_USAGE_STATS_ENABLED="0", RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER="0")
     from ray.cluster_utils import Cluster
 
-    here = {"node_ip_address": LOCAL, "include_dashboard": False}
     soon = {"health_check_period_ms": 1000, "health_check_failure_threshold": 3}
     cluster = Cluster(
-        initialize_head=True, head_node_args={"num_cpus": 0, "_system_config": soon, **here}
+        initialize_head=True, head_node_args={"num_cpus": 0, "_system_config": soon, **HERE}
     )
     for _ in range(2):
-        cluster.add_node(num_cpus=2, wait=False, **here)
+        cluster.add_node(num_cpus=2, wait=False, **HERE)
     cluster.wait_for_nodes()
     yield cluster
     cluster.shutdown()
@@ -101,6 +101,7 @@ def test_queries_survive_the_loss_of_a_node(
         asyncio.run(asyncio.wait_for(drive(), 3.0 * BACK_S))
     finally:
         engine.close()
+        cluster.add_node(num_cpus=2, **HERE)  # two workers and a front need three cores
 
 
 def test_the_service_runs_on_a_cluster(
