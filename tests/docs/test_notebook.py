@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from required import missing
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "docs" / "make_notebook.py"
@@ -25,7 +26,7 @@ def printed(book: Any) -> list[list[str]]:
 def test_the_notebook_runs_and_prints_what_it_shows() -> None:
     for needed in ("nbclient", "ipykernel"):
         if importlib.util.find_spec(needed) is None:
-            pytest.skip(f"without {needed}: pip install 'firstfix[dev]'")
+            missing("notebook", f"no {needed}: pip install 'firstfix[dev]'")
     spec = importlib.util.spec_from_file_location("make_notebook", SCRIPT)
     assert spec is not None
     assert spec.loader is not None
