@@ -209,12 +209,38 @@ def _judge(
     verdict, reason = judge(places.probabilities, evidence, config.unique_probability)
     if verdict is not Verdict.UNIQUE or known.speaks_for(places.poses[0]):
         return verdict, reason
-    is_sure = bool(places.probabilities[0] >= SURE_OF_SMALL_VIEW)
+    doubt = doubt_of_one_scan(scans, places.poses, places.probabilities, beams, fields)
+    return (Verdict.AMBIGUOUS, f"{reason}, {doubt}") if doubt else (verdict, reason)
+
+
+def doubt_of_one_scan(
+    scans: Sequence[LaserScan],
+    poses: NDArray[np.float64],
+    probabilities: NDArray[np.float64],
+    beams: Beams,
+    fields: MapFields,
+) -> str:
+    """Return why a scan must not decide by itself, whatever the law of costs says, or nothing.
+
+    Parameters
+    ----------
+    scans : sequence of LaserScan
+        One of each sensor.
+    poses : ndarray, shape (k, 3)
+        x, y (cells), heading (rad) of the sensor in the grid at separate places, best first.
+    probabilities : ndarray, shape (k,)
+        Of the places.
+    beams : Beams
+        The valid beams of the scans.
+    fields : MapFields
+        The prepared map.
+    """
+    is_sure = bool(probabilities[0] >= SURE_OF_SMALL_VIEW)
     if not see_enough(scans) and not (are_surrounded(scans) and is_sure):
-        return Verdict.AMBIGUOUS, f"{reason}, {SEES_TOO_LITTLE}"
-    if not leads_without_its_best_part(part_costs(places.poses[:RIVALS], beams, fields)):
-        return Verdict.AMBIGUOUS, f"{reason}, {DIFFERS_IN_LITTLE}"
-    return verdict, reason
+        return SEES_TOO_LITTLE
+    if not leads_without_its_best_part(part_costs(poses[:RIVALS], beams, fields)):
+        return DIFFERS_IN_LITTLE
+    return ""
 
 
 def _unless_unsearched(verdict: Verdict, reason: str, report: SearchReport) -> tuple[Verdict, str]:

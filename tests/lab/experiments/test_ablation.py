@@ -1,5 +1,6 @@
 """The default method, put together again: whole it is the same, and without a step it is not."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.config import LocateConfig
 from firstfix.global_localization.locate import locate
+from firstfix.global_localization.verdict import SEES_TOO_LITTLE
 from firstfix.lab.experiments.ablation import (
     AblatedMatcher,
     Without,
@@ -41,6 +43,13 @@ def scans(hall_plan: OccupancyGrid) -> list[LaserScan]:
     return [lidar.scan(hall_plan, pose, rng) for pose in POSES]
 
 
+def half_of(scan: LaserScan) -> LaserScan:
+    """Return a scan of a view of 180 degrees x 9 m, which sees too little to decide alone."""
+    ranges = np.where(scan.ranges < 9.0, scan.ranges, np.inf)
+    ranges[len(scan) // 2 :] = np.nan
+    return replace(scan, ranges=ranges, range_max=9.0)
+
+
 def test_without_nothing_it_is_the_default_method(
     fields: MapFields, scans: list[LaserScan]
 ) -> None:
@@ -49,7 +58,7 @@ def test_without_nothing_it_is_the_default_method(
     lidar = Lidar(beams=90)
     twin = lidar.scan(alike.grid, SE2(2.0, 2.0, 1.0), np.random.default_rng(1))
     blind = LaserScan(np.full(90, np.inf), 0.0, 0.07, 0.1, 12.0)
-    cases = [(whole, scan, fields) for scan in [*scans, blind]]
+    cases = [(whole, scan, fields) for scan in [*scans, half_of(scans[0]), blind]]
     for matcher, scan, prepared in [*cases, (AblatedMatcher(alike, Without.NOTHING), twin, alike)]:
         ours, theirs = matcher.locate(scan), locate((scan,), prepared, LocateConfig())
         assert (ours.verdict, ours.reason) == (theirs.verdict, theirs.reason)
@@ -68,6 +77,15 @@ def test_an_easy_place_is_found_without_any_one_step(
     result = AblatedMatcher(fields, without).locate(scans[0])
     assert result.best is not None
     assert is_found(result.best.pose, POSES[0])
+
+
+def test_without_its_rules_one_scan_decides_whatever_it_sees(
+    fields: MapFields, scans: list[LaserScan]
+) -> None:
+    scan = half_of(scans[0])
+    answers = [AblatedMatcher(fields, w).locate(scan) for w in (Without.NOTHING, Without.RULES)]
+    assert [answer.verdict for answer in answers] == [Verdict.AMBIGUOUS, Verdict.UNIQUE]
+    assert SEES_TOO_LITTLE in answers[0].reason
 
 
 def test_a_search_without_a_score_finds_other_places(

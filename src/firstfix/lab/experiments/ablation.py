@@ -29,13 +29,14 @@ from firstfix.global_localization.locate import (
     FIRST_LOOK_BEAMS,
     LISTED_PLACES,
     SECOND_LOOK_PLACES,
+    doubt_of_one_scan,
     worth_listing,
 )
 from firstfix.global_localization.places import distinct_places
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.search import Candidates, search
 from firstfix.global_localization.verdict import judge, nothing_to_match, place_probabilities
-from firstfix.global_localization.verify import verified_place, verify
+from firstfix.global_localization.verify import Verification, verified_place, verify
 from firstfix.lab.experiments.case import Case, evenly_spaced, known_truth
 from firstfix.lab.experiments.locate_bench import try_scan
 from firstfix.lab.experiments.machine import this_machine
@@ -72,6 +73,7 @@ class Without(Enum):
     RAYS = "sharpening on cast rays"
     COST = "verification cost"
     LAW = "verdict law"
+    RULES = "rules of one scan"
 
 
 # Without a cost there is nothing to make a verdict of: as in the paper the first is published.
@@ -80,6 +82,8 @@ _NO_VERDICT = frozenset({Without.COST, Without.LAW})
 
 class AblatedMatcher:
     """Locates scans in one map as `ScanMatcher` does, without one step.
+
+    The map must be small enough to be searched whole (`MapFields.is_looked_at`).
 
     Parameters
     ----------
@@ -119,9 +123,7 @@ class AblatedMatcher:
             resolution = fields.grid.resolution
             ranked = distinct_places(poses, verification.scores, resolution, config.hypotheses)
         probabilities = place_probabilities(verification.scores[ranked], len(beams))
-        verdict, reason = judge(
-            probabilities, verification.evidence(int(ranked[0])), config.unique_probability
-        )
+        verdict, reason = self._judged(scan, beams, verification, ranked, probabilities)
         if self._without in _NO_VERDICT:
             verdict, reason = Verdict.UNIQUE, "the best, whatever it is"
             probabilities = np.zeros(len(ranked))
@@ -131,6 +133,22 @@ class AblatedMatcher:
             for i, p in zip(ranked, probabilities, strict=True)
         )
         return LocateResult(verdict, reason, hypotheses, report, time.perf_counter() - started)
+
+    def _judged(
+        self,
+        scan: LaserScan,
+        beams: Beams,
+        verification: Verification,
+        ranked: NDArray[np.int64],
+        probabilities: NDArray[np.float64],
+    ) -> tuple[Verdict, str]:
+        evidence = verification.evidence(int(ranked[0]))
+        verdict, reason = judge(probabilities, evidence, LocateConfig().unique_probability)
+        if verdict is Verdict.UNIQUE and self._without is not Without.RULES:
+            poses = verification.poses[ranked]
+            if doubt := doubt_of_one_scan([scan], poses, probabilities, beams, self._fields):
+                return Verdict.AMBIGUOUS, f"{reason}, {doubt}"
+        return verdict, reason
 
     def _best_places(
         self, found: Candidates, beams: Beams, config: LocateConfig

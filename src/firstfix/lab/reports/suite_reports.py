@@ -20,7 +20,8 @@ ABLATION = (
     "The default method with one of its steps left out; figures are means over the cases of a "
     "kind. Without expected ranges or end points the search adds up only the other score. Without "
     "verification cost places keep the order of the search. Without it, or without the verdict "
-    "law, the first place is always published, as the paper does."
+    "law, the first place is always published, as the paper does. The rules of one scan ask for "
+    "a view that is wide enough, and for a lead in more than one thing."
 )
 SCALING = (
     "Drawn offices of one plan side by side, each furnished in its own way, on cells of 0.05 m; "
