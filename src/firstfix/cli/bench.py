@@ -57,7 +57,7 @@ _OPTIONS = {
     "--rides": {"--seed", "--maps", "--jobs"},
     "--suite paper": {"--worlds", "--runs", "--seed", "--jobs", "--report"},
     "--suite scaling": {"--seed", "--report"},
-    "--suite ablation": {"CASES", "--limit", "--sensor", "--jobs", "--report"},
+    "--suite ablation": {*_CASES, "--limit", "--jobs", "--report"},
 }
 _WITHOUT_CASES = {"--kidnap", "--rides", "--suite paper", "--suite scaling"}
 
