@@ -25,12 +25,13 @@ def test_the_papers_experiments_are_run_and_reported(cli, tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_steps_are_left_out_over_cases(cli, cases: Path, tmp_path: Path) -> None:
-    arguments = [cases / "unique", "--limit", 2, "--out", "a.json", "--report", "out"]
+    drawn = ["--floors", 7]
+    arguments = [cases / "unique", *drawn, "--limit", 2, "--out", "a.json", "--report", "out"]
     ended = cli("bench", "--suite", "ablation", *arguments)
     assert ended.status == 0, ended
     assert "verdict law" in ended.out
     document = json.loads((tmp_path / "a.json").read_text())
-    assert {row["n"] for row in document["rows"]} == {2}
+    assert {(row["kind"], row["n"]) for row in document["rows"]} == {("sim", 2), ("drawn", 2)}
     assert (tmp_path / "out" / "report.md").exists()
 
 
