@@ -120,6 +120,17 @@ def test_a_base_that_drove_before_its_next_message_causes_no_wrong_pose(
     assert "odometry has leapt" in of(Status, outputs)[0].reason
 
 
+@pytest.mark.parametrize("carried_to", [SE2(7.5, 5.5, -2.0), SE2(7.5, 1.0, 2.5)])
+def test_a_robot_that_was_off_and_carried_publishes_no_wrong_pose(in_hall, carried_to, poses):
+    """Its odometry is as before: it stood near the start of it, and begins there again."""
+    in_hall.ticks(10, A_STEP)
+    in_hall.pose = carried_to
+    in_hall.pass_time(3.0)
+    reported = [pose for _ in range(30) for pose in poses(in_hall.tick())]
+    assert reported
+    assert all(pose.T_map_base.distance_to(carried_to) < 0.3 for pose in reported)
+
+
 def test_a_robot_that_drove_without_messages_stays_localized(in_hall, kinds, is_at):
     for _ in range(12):
         in_hall.skip(A_STEP)

@@ -24,9 +24,11 @@ _START_M = 0.05
 # Past its end, odometry is continued for this long by its last motion, s.
 _EXTRAPOLATED_S = 0.2
 
-# After a gap of several messages, a longer step than this needs a scan that confirms it.
+# After a gap of several messages, a longer step than this needs a scan that confirms it. After a
+# silence of this many seconds any step does: the robot may have been off, and carried.
 _LEAP_M = 0.5
 _GAP_MESSAGES = 3.0
+_SILENCE_S = 1.0
 
 
 class OdometryBuffer:
@@ -66,7 +68,7 @@ class OdometryBuffer:
         """Return whether a message, not yet added, needs a scan that confirms it.
 
         After a gap a robot that drove on cannot be distinguished from one whose odometry was
-        restarted.
+        restarted, nor one that stood from one that was switched off and carried.
 
         Parameters
         ----------
@@ -76,7 +78,8 @@ class OdometryBuffer:
         Returns
         -------
         bool
-            True if it is far from the last one, and messages are missing in between.
+            True if messages are missing before it, and it is far from the last one or comes after
+            a silence of more than a second.
         """
         if len(self._kept) < 2:
             return False
@@ -84,8 +87,9 @@ class OdometryBuffer:
         usual_s = last.stamp - before.stamp
         distance = last.T_odom_base.distance_to(odometry.T_odom_base)
         turn = angle_error(last.T_odom_base.yaw, odometry.T_odom_base.yaw)
-        is_after_gap = odometry.stamp - last.stamp > _GAP_MESSAGES * usual_s
-        return is_after_gap and (distance > _LEAP_M or turn > _JUMP_RAD)
+        gap_s = odometry.stamp - last.stamp
+        is_far = distance > _LEAP_M or turn > _JUMP_RAD
+        return gap_s > _GAP_MESSAGES * usual_s and (is_far or gap_s > _SILENCE_S)
 
     def at(self, stamp: float) -> SE2 | None:
         """Interpolate ``T_odom_base`` at a time; None if it is not known there, or not yet."""
