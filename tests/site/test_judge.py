@@ -17,7 +17,7 @@ from firstfix.site.judge import MAP_EXPONENT, are_one_place, judge_site
 from firstfix.site.look import PROMISING, Looked
 from firstfix.site.places import SiteCandidates, SitePlace
 from firstfix.site.query import SiteQuery
-from firstfix.site.surroundings import show_the_same, surroundings
+from firstfix.site.surroundings import are_alike, show_the_same, surroundings
 
 EVIDENCE = Evidence(0.9, 0.1, 0.0, 0.0, 180)
 BEAMS = 360
@@ -138,6 +138,9 @@ def test_surroundings_tell_an_edited_map_from_another_floor() -> None:
     first = surroundings(MapFields(draw(ROOMS["first"])), pose)
     assert show_the_same(ground, same)
     assert show_the_same(ground, edited)
+    assert are_alike(ground, first), "the outer walls are the same"
+    turned = surroundings(MapFields(draw(plan)), SE2(3.0, 2.0, 1.2))
+    assert not are_alike(ground, turned)
     assert not show_the_same(ground, first)
     assert not show_the_same(ground, np.zeros_like(ground))
 

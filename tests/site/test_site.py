@@ -15,6 +15,7 @@ from firstfix.core.estimate import Verdict
 from firstfix.core.se2 import SE2
 from firstfix.io.maps.map_server import save_map
 from firstfix.site.judge import judge_site
+from firstfix.site.result import SiteResult
 from firstfix.site.site import Site
 
 T = TypeVar("T")
@@ -135,6 +136,30 @@ def test_an_edited_copy_shows_the_same_around_the_place(tmp_path: Path) -> None:
     result = Site.load(tmp_path).locate(scan_in("ground", POSE))
     assert result.verdict is Verdict.UNIQUE
     assert {result.map_id, result.same_places[0][0].map_id} == {"edited", "ground"}
+
+
+WAY = [POSE, SE2(4.3, 1.9, 0.6), SE2(4.7, 2.1, 0.8)]
+
+
+def asked(site: Site, room: str, way: list[SE2]) -> SiteResult:
+    scans = [scan_in(room, pose, i, float(i)) for i, pose in enumerate(way)]
+    return site.locate(scans, [way[0].inverse() @ pose for pose in way])
+
+
+@pytest.mark.parametrize("way", [WAY[:1], WAY], ids=["one scan", "several"])
+def test_a_near_copy_is_no_rival_unless_it_is_another_floor(tmp_path: Path, way: list[SE2]) -> None:
+    # The robot is where a cupboard was when the map was drawn. The other map never had it.
+    save_map(draw([*ROOMS["ground"], (2.2, 5.2, 3.2, 6.0)]), tmp_path / "own.yaml")
+    save_map(draw(ROOMS["ground"]), tmp_path / "other.yaml")
+    copies = asked(Site.load(tmp_path), "ground", way)
+    assert copies.verdict is Verdict.UNIQUE
+    assert {copies.map_id, copies.same_places[0][0].map_id} == {"own", "other"}
+    (tmp_path / "site.yaml").write_text(
+        "maps:\n  own: {map: own.yaml, floor: 0}\n  other: {map: other.yaml, floor: 1}\n"
+    )
+    floors = asked(Site.load(tmp_path), "ground", way)
+    assert floors.verdict is Verdict.AMBIGUOUS, floors.reason
+    assert not floors.same_places[0]
 
 
 def test_maps_that_overlap_in_the_site_are_no_rivals(tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ from firstfix.site.look import Looked
 from firstfix.site.places import SiteCandidates, SitePlace
 from firstfix.site.query import SiteQuery
 from firstfix.site.result import SiteResult
-from firstfix.site.surroundings import show_the_same
+from firstfix.site.surroundings import are_alike, show_the_same
 from firstfix.site.views import has_moved, views_of
 
 # Least probability for UNIQUE: of one look as in `LocateConfig`, of several views as in the belief.
@@ -167,9 +167,17 @@ def _judge_look(
         return verdict, reason
     if not see_enough(query.scans):
         return Verdict.AMBIGUOUS, f"{reason}, {SEES_TOO_LITTLE}"
-    if not leads_without_its_best_part(np.array([p.part_costs for p in places[:RIVALS]])):
+    if not _leads_clearly(places[:RIVALS]):
         return Verdict.AMBIGUOUS, f"{reason}, {DIFFERS_IN_LITTLE}"
     return verdict, reason
+
+
+def _leads_clearly(places: Sequence[SitePlace]) -> bool:
+    """Tell whether the first place leads not only by one thing that may have been moved."""
+    best = places[0].part_costs
+    return leads_without_its_best_part(
+        np.array([place.part_costs for place in places if len(place.part_costs) == len(best)])
+    )
 
 
 def _judge_views(
@@ -191,8 +199,28 @@ def _judge_views(
         or _is_hinted(query, places[0])
         or _decides_alone(views[-1].scans, places)
     ):
-        return Verdict.UNIQUE, f"{len(views)} views fit here and nowhere else nearly as well"
+        reason = f"{len(views)} views fit here and nowhere else nearly as well"
+        if not _is_hinted(query, places[0]) and not _leads_clearly(_with_twins(places)):
+            return Verdict.AMBIGUOUS, f"{len(views)} views fit best here, {DIFFERS_IN_LITTLE}"
+        return Verdict.UNIQUE, reason
     return Verdict.AMBIGUOUS, f"one place has {best[-1]:.0%} of the probability, {_SEEN_ONCE}"
+
+
+def _with_twins(places: Sequence[SitePlace]) -> list[SitePlace]:
+    """Return the first place, and the best ones of maps that show nearly the same there."""
+    best = places[0]
+    return [
+        best,
+        *(
+            place
+            for place in places
+            if place.map_id != best.map_id
+            and place.part_costs
+            and place.around is not None
+            and best.around is not None
+            and are_alike(place.around, best.around)
+        ),
+    ]
 
 
 def _decides_alone(scans: Sequence[LaserScan], places: Sequence[SitePlace]) -> bool:

@@ -34,7 +34,8 @@ class SitePlace:
     level : tuple of str or None
         Building and floor of the map.
     part_costs : tuple of float
-        What each part of the scan costs (`lead.part_costs`); empty after several views.
+        What each part of the scan costs (`lead.part_costs`). After several views the parts of all,
+        and only for the best place of each map.
     around : ndarray of uint8 or None
         What the map shows around the place (`surroundings`); None for unlikely places.
     """

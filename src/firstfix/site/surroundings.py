@@ -19,6 +19,8 @@ UNKNOWN, FREE, WALL = 0, 1, 2
 # Least share of the walls of each map that the other has, too, where it knows the place. Floors of
 # one building share up to 86 %, a map and its edited or extended copy at least 92 % (0021).
 _SAME_SHARE = 0.92
+# Floors of one building share at least 73 %.
+_ALIKE_SHARE = 0.7
 # Fewer walls than these, or less common ground, prove nothing.
 _FEWEST_WALLS = 100
 _COMMON_SHARE = 0.5
@@ -62,11 +64,27 @@ def show_the_same(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> bool:
     a, b : ndarray of uint8, shape (n, n)
         From `surroundings`, of one place in two maps.
     """
+    return _common_walls(a, b) >= _SAME_SHARE
+
+
+def are_alike(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> bool:
+    """Tell whether two maps show nearly the same around a place, as floors of one building do.
+
+    Parameters
+    ----------
+    a, b : ndarray of uint8, shape (n, n)
+        From `surroundings`, of one place in two maps.
+    """
+    return _common_walls(a, b) >= _ALIKE_SHARE
+
+
+def _common_walls(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:
+    """Return the share of the walls of each map that the other has, too: the smaller of the two."""
     known = (a != UNKNOWN) & (b != UNKNOWN)
     smaller = min(np.count_nonzero(a), np.count_nonzero(b))
     if np.count_nonzero(known) < _COMMON_SHARE * smaller:
-        return False
-    return all(_share_of_walls(one, other, known) >= _SAME_SHARE for one, other in ((a, b), (b, a)))
+        return 0.0
+    return min(_share_of_walls(one, other, known) for one, other in ((a, b), (b, a)))
 
 
 def _share_of_walls(

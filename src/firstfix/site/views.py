@@ -13,12 +13,14 @@ from firstfix.belief.belief import NEWS_M, NEWS_RAD, Belief, begin, update
 from firstfix.belief.evidence import WRONG_MAP_COST, log_likelihoods
 from firstfix.belief.hints import hint_logs
 from firstfix.belief.joint import joint_log_likelihoods, power_of
+from firstfix.belief.planar import compose
 from firstfix.belief.prior import FLOOR
 from firstfix.belief.several import distinct_views
 from firstfix.belief.view import View
+from firstfix.global_localization.lead import part_costs
 from firstfix.site.maps import Maps, PreparedMap
 from firstfix.site.places import SitePlace
-from firstfix.site.query import SiteQuery
+from firstfix.site.query import SitePrior, SiteQuery
 from firstfix.site.search import as_place
 
 
@@ -82,41 +84,79 @@ def has_moved(start: View, end: View, metres: float, radians: float) -> bool:
 
 def _history(query: SiteQuery, prepared: PreparedMap) -> MapHistory:
     map_id = prepared.entry.id
-    is_named = query.prior is None or map_id in query.prior
-    before = 0.0 if is_named else FLOOR
+    before = known_of(map_id, query.prior)
     belief = begin(prepared.fields, query.prior_in(map_id))
     steps: list[dict[int, float]] = []
     for view in views_of(query):
         belief = update(belief, view)
         steps.append(
-            dict(zip(belief.tracks.ids.tolist(), (_logs(belief) + before).tolist(), strict=True))
+            dict(zip(belief.tracks.ids.tolist(), (logs_of(belief) + before).tolist(), strict=True))
         )
     totals = np.array(
         [np.logaddexp.reduce([*logs.values()]) if logs else -np.inf for logs in steps]
     )
+    names = belief.tracks.ids.tolist()
+    past = [tuple(logs.get(name, -math.inf) for logs in steps) for name in names]
+    return MapHistory(described(belief, prepared, before, past), totals)
+
+
+def described(
+    belief: Belief, prepared: PreparedMap, before: float, past: Sequence[tuple[float, ...]]
+) -> list[SitePlace]:
+    """Describe the places that a belief lists.
+
+    Parameters
+    ----------
+    belief : Belief
+        Of one map.
+    prepared : PreparedMap
+        The map.
+    before : float
+        What was known of the map: a log-likelihood up to 0.
+    past : sequence of tuple of float
+        `SitePlace.steps` of each place.
+    """
     if not belief.window:
-        return MapHistory([], totals)
+        return []
     alone = joint_logs(belief)
     hinted = hint_logs(belief.tracks.now, belief.window[-1], belief.hints, prepared.fields.grid)
-    places = [
+    parts = _parts_of_best(belief)
+    return [
         as_place(
             hypothesis,
             prepared,
             float(alone[i]),
             float(hinted[i]) + before,
-            tuple(logs.get(int(belief.tracks.ids[i]), -math.inf) for logs in steps),
+            past[i],
             float(belief.tracks.costs[i, -1]),
+            parts if i == 0 else (),
         )
         for i, hypothesis in enumerate(belief.places)
     ]
-    return MapHistory(places, totals)
 
 
-def _logs(belief: Belief) -> NDArray[np.float64]:
+def _parts_of_best(belief: Belief) -> tuple[float, ...]:
+    """Return what each part of each view costs at the best place of a map."""
+    if len(belief.tracks) == 0:
+        return ()
+    parts = []
+    for pose, seen in zip(belief.tracks.poses[0], belief.window, strict=True):
+        at = compose(pose[None], seen.sensor.T_base_laser)
+        parts += part_costs(at, seen.beams, belief.fields)[0].tolist()
+    return tuple(parts)
+
+
+def logs_of(belief: Belief) -> NDArray[np.float64]:
+    """Return log-posteriors of a belief's places, shape (n,); a wrong map has 0."""
     if not belief.window:
         return np.empty(0)
     hints = hint_logs(belief.tracks.now, belief.window[-1], belief.hints, belief.fields.grid)
     return joint_logs(belief) + hints
+
+
+def known_of(map_id: str, prior: SitePrior | None) -> float:
+    """Return what a prior says of a map as a whole: a log-likelihood up to 0."""
+    return 0.0 if prior is None or map_id in prior else FLOOR
 
 
 def joint_logs(belief: Belief) -> NDArray[np.float64]:
