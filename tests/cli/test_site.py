@@ -56,6 +56,16 @@ def test_locate_as_json_lists_the_same_place_in_the_copy(cli, floors: Path) -> N
     assert Path("x.png").stat().st_size > 1000
 
 
+def test_a_zone_is_known_or_one_sentence(cli, floors: Path) -> None:
+    hall = "{hall: [[3, 1], [5, 1], [5, 3], [3, 3]]}"
+    Path("site.yaml").write_text(f"maps:\n  own: {{map: {floors}/ground, zones: {hall}}}\n")
+    ended = cli("site", "locate", "site.yaml", floors / "scans.npz", "--zone", "hall")
+    assert ended.status == 0, ended.err
+    ended = cli("site", "locate", "site.yaml", floors / "scans.npz", "--zone", "attic")
+    assert (ended.status, ended.err.count("\n")) == (2, 1)
+    assert ended.err.startswith("firstfix: There is no zone 'attic' in this site.")
+
+
 def test_a_broken_map_is_named_and_the_others_are_searched(cli, floors: Path) -> None:
     (Path("maps")).symlink_to(floors)
     Path("site.yaml").write_text("maps: {ground: maps/ground, gone: maps/gone.yaml}\n")

@@ -127,6 +127,13 @@ def test_a_known_map_is_searched_where_it_is_held(
     assert asyncio.run(fleet.locate(query, "first")).map_id != "second"
 
 
+def test_the_preparation_says_which_maps_are_done(here: tuple[Here, Fleet]) -> None:
+    _, fleet = here
+    done: list[str] = []
+    asyncio.run(fleet.prepare(done.append))
+    assert sorted(done) == list(fleet.map_ids)
+
+
 def test_a_lost_job_is_given_again(here: tuple[Here, Fleet]) -> None:
     engine, fleet = here
     asyncio.run(fleet.prepare())

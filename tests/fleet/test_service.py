@@ -96,6 +96,9 @@ def test_a_prior_names_maps(server: FleetServer) -> None:
     near = {"pose": list(POSE), "radius": 1.0}
     answer = ask(server, scans=[message], prior={"second": near, "first": None})
     assert answer["map_id"] == "second"
+    refused = server.http.post("/v1/locate", json={"scans": [message], "zone": "attic"})
+    assert refused.status_code == 422
+    assert refused.json()["detail"].startswith("No map of this site has zones.")
     for prior, status in (({"attic": None}, 404), ({"second": {**near, "radius": -1.0}}, 422)):
         refused = server.http.post("/v1/locate", json={"scans": [message], "prior": prior})
         assert refused.status_code == status, refused.text

@@ -198,6 +198,37 @@ def test_a_prior_names_the_map_and_is_overruled_by_the_scan(site: Site) -> None:
         site.locate(scan, prior=Near(POSE, 1.0))  # type: ignore[arg-type]
 
 
+def test_a_zone_of_the_site_is_a_prior(tmp_path: Path) -> None:
+    save_rooms(tmp_path)
+    scan = scan_in("ground", POSE)
+    with pytest.raises(InputError, match="No map of this site has zones"):
+        Site.load(tmp_path).zone("lobby")
+    here = "[[3, 1], [5, 1], [5, 2.4], [3, 2.4]]"
+    there = "[[5.2, 3.2], [7.8, 3.2], [7.8, 5.8], [5.2, 5.8]]"
+    (tmp_path / "site.yaml").write_text(
+        f"maps:\n  low: {{map: ground, floor: 0, zones: {{lobby: {here}, stairs: {there}}}}}\n"
+        f"  high: {{map: ground, floor: 1, zones: {{stairs: {here}}}}}\n"
+    )
+    site = Site.load(tmp_path)
+    assert site.locate(scan).verdict is Verdict.AMBIGUOUS
+    assert set(site.zone("stairs")) == {"low", "high"}
+    for zone, floor in (("lobby", "low"), ("stairs", "high")):
+        result = site.locate(scan, prior=site.zone(zone))
+        assert (result.verdict, result.map_id) == (Verdict.UNIQUE, floor), result.reason
+    with pytest.raises(InputError, match=r"no zone 'attic' in this site. Choose one of lobby, st"):
+        site.zone("attic")
+
+
+def test_the_preparation_says_which_map_of_how_many(
+    folder: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO", "firstfix.site")
+    done: list[str] = []
+    Site.load(folder).prepare(done.append)
+    assert sorted(done) == sorted(ROOMS)
+    assert caplog.messages[-1] == f"map 3 of 3 is prepared: {done[-1]}"
+
+
 def test_too_few_hits_match_nothing(site: Site) -> None:
     blocked = scan_in("ground", POSE, range_max=0.2)
     result = site.locate(blocked)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from firstfix.cli.progress import progress_of_start
 from firstfix.cli.serve import Address
 from firstfix.cli.site import SitePath
 from firstfix.core.errors import InputError
@@ -104,15 +105,18 @@ def serve(
     with listen(host, port) as listening:
         started = _start(engine, sharded, ray_address)
         service = Service(
-            Fleet(started, shards, copies), FleetConfig(max_waiting, max_robots, idle)
+            Fleet(started, shards, copies, maps=maps), FleetConfig(max_waiting, max_robots, idle)
         )
-        app = make_app(service, access)
         typer.echo(
             f"Fleet service  {url_of(listening)}  {sum(map(len, shards))} maps, "
             f"{len(shards)} parts, {copies} workers for each (Ctrl-C ends)"
         )
         try:
-            with suppress(KeyboardInterrupt):  # the usual end
+            with (
+                progress_of_start(len(maps), "preparing maps") as prepared,
+                suppress(KeyboardInterrupt),  # the usual end
+            ):
+                app = make_app(service, access, prepared)
                 server_of(app, MOST_CONNECTIONS).run(sockets=[listening])
         finally:
             started.close()

@@ -45,6 +45,10 @@ def locate(
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw the answer: .png, .svg or .pdf.")
     ] = None,
+    zone: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="The robot is in this zone of site.yaml, in any map."),
+    ] = None,
     topic: Topics = None,
     laser_pose: LaserPose = None,
     base_frame: BaseFrame = None,
@@ -61,6 +65,7 @@ def locate(
 
         check_picture(plot)
     site = load_site(site_path)
+    prior = None if zone is None else site.zone(zone)
     recording = read_log(scans, topic, laser_pose, base_frame, laser_frame, index + 1)
     instants = recording.instants()
     if index >= len(instants):
@@ -68,7 +73,7 @@ def locate(
             f"There is no scan {index} in {scans}. Choose one up to {len(instants) - 1}."
         )
     prepare_site(site)
-    result = site.locate([recording.scans[i] for i in instants[index]])
+    result = site.locate([recording.scans[i] for i in instants[index]], prior=prior)
     if as_lines:
         typer.echo(json.dumps(result.to_dict(index), allow_nan=False))
     else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import re
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +51,9 @@ RATE_HZ, BURST = 500.0, 1000.0
 _AGAIN = {"retry-after": "1"}
 
 
-def make_app(service: Service, access: AccessPolicy) -> ASGIApp:
+def make_app(
+    service: Service, access: AccessPolicy, on_prepared: Callable[[str], None] = lambda _: None
+) -> ASGIApp:
     """Make the ASGI application of a service; its maps are prepared when it starts.
 
     Parameters
@@ -60,6 +62,8 @@ def make_app(service: Service, access: AccessPolicy) -> ASGIApp:
         What it serves.
     access : AccessPolicy
         Who may ask.
+    on_prepared : callable
+        Called with the id of each map when it is ready, or found to be unusable.
 
     Returns
     -------
@@ -70,7 +74,7 @@ def make_app(service: Service, access: AccessPolicy) -> ASGIApp:
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        preparing = asyncio.create_task(service.fleet.prepare())
+        preparing = asyncio.create_task(service.fleet.prepare(on_prepared))
         yield
         preparing.cancel()
         with contextlib.suppress(asyncio.CancelledError):
@@ -154,7 +158,9 @@ class _Api:
         """Find the map and the place of a robot."""
         kind = media_type(request, JSON, NPZ)
         body = await read_body(request)
-        asked = await asyncio.to_thread(read_query, body, kind, request.query_params.get("map"))
+        asked = await asyncio.to_thread(
+            read_query, body, kind, request.query_params.get("map"), self._service.fleet.zone
+        )
         return _json(await self._service.locate(asked))
 
     async def robots(self, _: Request) -> Response:
@@ -180,7 +186,9 @@ class _Api:
         name = _robot(request)
         media_type(request, JSON)
         body = await read_body(request)
-        scans, T_odom_base, prior = await asyncio.to_thread(read_robot_scans, body)
+        scans, T_odom_base, prior = await asyncio.to_thread(
+            read_robot_scans, body, self._service.fleet.zone
+        )
         view = RobotView(scans, T_odom_base)
         return _json(await self._service.locate_robot(name, view, prior))
 

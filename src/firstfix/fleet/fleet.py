@@ -14,10 +14,12 @@ from typing import Any, TypeVar
 from firstfix.core.errors import InputError
 from firstfix.fleet.engine import Engine, WorkerLostError
 from firstfix.fleet.jobs import Done, Job, Look, Prepare, Search, WarmUp
+from firstfix.io.maps.site_yaml import SiteMap
 from firstfix.site.judge import judge_site
 from firstfix.site.look import Looked, look_at_all
-from firstfix.site.query import SiteQuery
+from firstfix.site.query import SitePrior, SiteQuery
 from firstfix.site.result import SiteResult
+from firstfix.site.zones import zone_prior
 
 T = TypeVar("T")
 
@@ -62,6 +64,8 @@ class Fleet:
         Jobs that were lost with their worker.
     warm : set of int
         Workers that have compiled or loaded their kernels.
+    maps : sequence of SiteMap
+        What the files of the site say of its maps: their zones.
     on_map : callable, optional
         Does a job with one map, by its id; by default the worker that has the map does.
     """
@@ -75,6 +79,7 @@ class Fleet:
     cpu_s: dict[int, float] = field(default_factory=dict)
     lost_jobs: int = 0
     warm: set[int] = field(default_factory=set)
+    maps: Sequence[SiteMap] = ()
     on_map: OnMap | None = None
     _running: Counter[int] = field(default_factory=Counter)
 
@@ -89,9 +94,15 @@ class Fleet:
         maps, workers = sum(map(len, self.shards)), self.copies * len(self.shards)
         return len(self.prepared) + len(self.faults) == maps and len(self.warm) == workers
 
-    async def prepare(self) -> None:
-        """Prepare all maps, each worker one after the other; then let all workers warm up."""
-        await asyncio.gather(*(self._prepare(i) for i in range(len(self.shards))))
+    async def prepare(self, done: Callable[[str], None] = lambda _: None) -> None:
+        """Prepare all maps, each worker one after the other; then let all workers warm up.
+
+        Parameters
+        ----------
+        done : callable
+            Called with the id of each map when it is ready, or found to be unusable.
+        """
+        await asyncio.gather(*(self._prepare(i, done) for i in range(len(self.shards))))
         await asyncio.gather(*(self._warm_up(i) for i in range(self.copies * len(self.shards))))
 
     async def locate(self, query: SiteQuery, only: str | None = None) -> SiteResult:
@@ -144,6 +155,10 @@ class Fleet:
             elapsed_s=time.perf_counter() - started,
         )
 
+    def zone(self, name: str) -> SitePrior:
+        """Return the prior of a robot in a zone; InputError if no map has it."""
+        return zone_prior(self.maps, name)
+
     def check_maps(self, map_ids: Sequence[str]) -> None:
         """Raise UnknownMapError if one of the maps is not in the site."""
         known = set(self.map_ids)
@@ -173,7 +188,7 @@ class Fleet:
             raise NotReadyError("No map of the site can be used. GET /v1/maps says why.")
         return usable
 
-    async def _prepare(self, worker: int) -> None:
+    async def _prepare(self, worker: int, done: Callable[[str], None]) -> None:
         for map_id in self.shards[worker]:
             try:
                 fault = await self._ask(worker, Prepare(map_id))
@@ -183,6 +198,7 @@ class Fleet:
                 self.prepared.add(map_id)
             else:
                 self.faults[map_id] = fault
+            done(map_id)
 
     async def _warm_up(self, worker: int) -> None:
         with contextlib.suppress(NotReadyError):  # queries will say so

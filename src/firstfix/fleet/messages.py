@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -11,6 +12,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from firstfix.belief.prior import Near
+from firstfix.core.errors import InputError
 from firstfix.core.estimate import Evidence, Verdict
 from firstfix.core.scan import MAX_BEAMS, LaserScan
 from firstfix.core.se2 import SE2
@@ -51,6 +53,19 @@ PriorOfMaps = (
     ]
     | None
 )
+Zone = (
+    Annotated[
+        str,
+        Meta(
+            max_length=200,
+            description="the robot is in this zone of site.yaml, instead of a prior",
+        ),
+    ]
+    | None
+)
+Zones = Callable[[str], SitePrior]
+"""Returns the prior of a zone by its name."""
+
 Scans = Annotated[list[Scan], Meta(min_length=1, max_length=MOST_SCANS)]
 
 
@@ -64,6 +79,7 @@ class LocateScans(Struct, frozen=True, forbid_unknown_fields=True):
     ] = None
     prior: PriorOfMaps = None
     map: Annotated[str | None, Meta(description="the map of the robot, if it is known")] = None
+    zone: Zone = None
 
 
 class RobotScans(Struct, frozen=True, forbid_unknown_fields=True):
@@ -72,6 +88,7 @@ class RobotScans(Struct, frozen=True, forbid_unknown_fields=True):
     scans: Scans
     odometry: PoseOfBase
     prior: PriorOfMaps = None
+    zone: Zone = None
 
 
 class SamePlace(Struct, frozen=True):
@@ -161,7 +178,7 @@ class Asked:
     only: str | None = None
 
 
-def read_query(body: bytes, kind: str, map_id: str | None) -> Asked:
+def read_query(body: bytes, kind: str, map_id: str | None, zones: Zones) -> Asked:
     """Read the body of ``POST /v1/locate``.
 
     Parameters
@@ -172,6 +189,8 @@ def read_query(body: bytes, kind: str, map_id: str | None) -> Asked:
         Media type.
     map_id : str or None
         The map of the robot, where the body does not have it.
+    zones : callable
+        Returns the prior of a zone.
 
     Raises
     ------
@@ -185,14 +204,24 @@ def read_query(body: bytes, kind: str, map_id: str | None) -> Asked:
         return Asked(SiteQuery.of(scan.laser_scan()), scan.map or map_id)
     asked: LocateScans = decode(body, LocateScans)
     odometry = None if asked.odometry is None else [SE2(*pose) for pose in asked.odometry]
-    query = SiteQuery.of(_laser_scans(asked.scans), odometry, prior_of(asked.prior))
+    query = SiteQuery.of(_laser_scans(asked.scans), odometry, _prior(asked, zones))
     return Asked(query, asked.map or map_id)
 
 
-def read_robot_scans(body: bytes) -> tuple[tuple[LaserScan, ...], SE2, SitePrior | None]:
+def read_robot_scans(
+    body: bytes, zones: Zones
+) -> tuple[tuple[LaserScan, ...], SE2, SitePrior | None]:
     """Read the body of ``POST /v1/robots/{id}/scans``: scans, odometry, prior."""
     asked: RobotScans = decode(body, RobotScans)
-    return _laser_scans(asked.scans), SE2(*asked.odometry), prior_of(asked.prior)
+    return _laser_scans(asked.scans), SE2(*asked.odometry), _prior(asked, zones)
+
+
+def _prior(asked: LocateScans | RobotScans, zones: Zones) -> SitePrior | None:
+    if asked.zone is None:
+        return prior_of(asked.prior)
+    if asked.prior is not None:
+        raise InputError("Give either a zone or a prior of maps.")
+    return zones(asked.zone)
 
 
 def prior_of(given: dict[str, NearPose | None] | None) -> SitePrior | None:

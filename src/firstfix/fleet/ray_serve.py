@@ -97,7 +97,7 @@ def build(arguments: dict[str, str]) -> Any:
                 known.options(method_name="run", multiplexed_model_id=map_id).remote(job)
             )
 
-        service = Service(Fleet(engine, shards, copies, on_map=on_map))
+        service = Service(Fleet(engine, shards, copies, maps=maps, on_map=on_map))
         return make_app(service, AccessPolicy(token, loopback_only=False))
 
     class FleetFront:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import time
@@ -27,6 +28,9 @@ from firstfix.site.result import SiteResult
 from firstfix.site.search import search_one_look
 from firstfix.site.surroundings import surroundings
 from firstfix.site.views import search_views
+from firstfix.site.zones import zone_prior
+
+_log = logging.getLogger(__name__)
 
 MEMORY_LIMIT = 2 << 30
 """Default size of the prepared maps that are held at once, bytes."""
@@ -122,6 +126,21 @@ class Site:
         """Lifts, doors and other ways between maps."""
         return self._transitions
 
+    def zone(self, name: str) -> SitePrior:
+        """Return a prior for `locate`: the robot is in a zone, in any map that has it.
+
+        Parameters
+        ----------
+        name : str
+            As in the ``zones`` of ``site.yaml``.
+
+        Raises
+        ------
+        InputError
+            If no map has such a zone.
+        """
+        return zone_prior(self._entries.values(), name)
+
     def fields(self, map_id: str) -> MapFields:
         """Return a prepared map.
 
@@ -157,8 +176,9 @@ class Site:
         done : callable
             Called with the id of each map when it is ready, or found to be unusable.
         """
-        for map_id in self._entries:
+        for i, map_id in enumerate(self._entries):
             self.prepare_map(map_id)
+            _log.info("map %d of %d is prepared: %s", i + 1, len(self._entries), map_id)
             done(map_id)
         if self._cache_dir is not None:
             remove_unused(self._cache_dir, UNUSED_DAYS)
