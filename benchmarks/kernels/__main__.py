@@ -23,15 +23,18 @@ from typing import Any
 import limits
 import numpy as np
 import of_amcl
+import of_belief
+import of_changes
 import of_fields
+import of_look
 import of_search
 import of_sim
 from kernel import Kernel, Roof, name_of
 from limits import Limit
 from numba.core.registry import CPUDispatcher
 
-import firstfix
 from firstfix.core.grid import OccupancyGrid
+from firstfix.fields import kernel_cache
 from firstfix.fields.map_fields import MapFields
 from firstfix.io.maps.map_server import load_map
 from firstfix.lab.experiments.machine import machine_text, this_machine
@@ -89,7 +92,10 @@ def kernels(grid: OccupancyGrid) -> list[Kernel]:
     return [
         *of_fields.kernels(fields, rng),
         *of_search.kernels(fields, scan),
+        *of_look.kernels(fields, scan),
+        *of_belief.kernels(fields, scan, rng),
         *of_amcl.kernels(grid, pose, scan, rng),
+        *of_changes.kernels(fields, pose, scan, rng),
         *of_sim.kernels(grid, pose, rng),
     ]
 
@@ -106,14 +112,19 @@ def report_missing(measured: Iterable[Kernel]) -> None:
 def compiled_functions() -> set[Any]:
     """All functions of the package that numba compiles."""
     found = set()
-    for package in ("fields", "global_localization", "amcl", "lab.simulation"):
-        path = [
-            str(folder.joinpath(*package.split("."))) for folder in map(Path, firstfix.__path__)
-        ]
-        for module in pkgutil.iter_modules(path, f"firstfix.{package}."):
+    for folder in kernel_cache._FOLDERS:
+        package = folder.replace("/", ".")
+        for module in pkgutil.iter_modules(
+            [str(kernel_cache.PACKAGE / folder)], f"firstfix.{package}."
+        ):
             contents = vars(importlib.import_module(module.name)).values()
-            found |= {item for item in contents if isinstance(item, CPUDispatcher)}
+            found |= {item for item in contents if is_compiled(item)}
     return found
+
+
+def is_compiled(item: object) -> bool:
+    """Tell a kernel from other things, and from parts, which are copied into their callers."""
+    return isinstance(item, CPUDispatcher) and "inline" not in item.targetoptions
 
 
 def interleaved(things: list[Limit | Kernel], runs: int) -> dict[Limit | Kernel, list[float]]:

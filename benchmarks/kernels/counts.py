@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from compiled import compiled
 from numpy.typing import NDArray
 
 from firstfix.core.angles import FULL_TURN
@@ -13,7 +13,7 @@ from firstfix.fields.raycast import _is_inside_cell, _towards
 from firstfix.lab.simulation.wavefront import _improve
 
 
-@njit
+@compiled
 def steps(
     occupied: NDArray[np.bool_], x: float, y: float, headings: NDArray[np.float64], reach: float
 ) -> int:
@@ -39,7 +39,7 @@ def steps(
     return total
 
 
-@njit
+@compiled
 def leaps(
     clearance: NDArray[np.uint8],
     x: NDArray[np.float64],
@@ -82,7 +82,20 @@ def leaps(
     return total
 
 
-@njit
+def at_poses(
+    clearance: NDArray[np.uint8],
+    poses: NDArray[np.float64],
+    bearings: NDArray[np.float64],
+    reach: NDArray[np.float64],
+) -> float:
+    """Count the leaps of all beams at all poses (cells, rad); ``reach`` is that of each beam."""
+    n, angles = len(bearings), poses[:, 2:] + bearings
+    x, y = np.repeat(poses[:, 0], n), np.repeat(poses[:, 1], n)
+    dx, dy = np.cos(angles).ravel(), np.sin(angles).ravel()
+    return float(leaps(clearance, x, y, dx, dy, np.tile(reach, len(poses))))
+
+
+@compiled
 def rounds_outward(near: NDArray[np.uint16], limit: int, chunk: int) -> float:
     """Count the columns that `_look_outward` compares to each side, over all cells of one row."""
     width = near.size
@@ -105,7 +118,7 @@ def rounds_outward(near: NDArray[np.uint16], limit: int, chunk: int) -> float:
     return total
 
 
-@njit
+@compiled
 def pairs(
     poses: NDArray[np.float64],
     order: NDArray[np.int64],
@@ -141,7 +154,7 @@ def passes(weights: NDArray[np.float32], start: tuple[int, int]) -> int:
     return _passes(_improve, weights, costs)
 
 
-@njit
+@compiled
 def _passes(improve: object, weights: NDArray[np.float32], costs: NDArray[np.float32]) -> int:
     height, width = weights.shape
     count, changed = 0, True

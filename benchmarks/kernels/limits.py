@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numba import njit
+from compiled import compiled
 from numpy.typing import NDArray
 
 # What is measured on fewer bytes, or more, is measured on so many.
@@ -191,10 +191,7 @@ def surprises() -> Limit:
     return Limit("branches foretold wrong", bits.size / 2, lambda: _keep(bits, kept))
 
 
-# Nothing here is cached: a stale limit would judge for ever.
-
-
-@njit
+@compiled
 def _sum(values: NDArray[np.int64], times: int) -> None:
     for _ in range(times):
         total = 0
@@ -203,14 +200,14 @@ def _sum(values: NDArray[np.int64], times: int) -> None:
         values[0] = total  # else one time would do for all
 
 
-@njit
+@compiled
 def _add_one(source: NDArray[np.int64], target: NDArray[np.int64], times: int) -> None:
     for _ in range(times):
         for i in range(source.size):
             target[i] = source[i] + 1
 
 
-@njit
+@compiled
 def _add_runs(
     values: NDArray[np.uint8], starts: NDArray[np.uint64], total: NDArray[np.uint8]
 ) -> None:
@@ -223,7 +220,7 @@ def _add_runs(
             total[x] += np.uint8(np.uint8(s + t) + np.uint8(values[g + x] + values[h + x]))
 
 
-@njit
+@compiled
 def _sum_at(values: NDArray[np.int32], places: NDArray[np.uint32]) -> int:
     total = np.int32(0)
     for i in range(places.size):
@@ -231,7 +228,7 @@ def _sum_at(values: NDArray[np.int32], places: NDArray[np.uint32]) -> int:
     return total
 
 
-@njit
+@compiled
 def _follow(following: NDArray[np.int32], steps: int) -> int:
     i = 0
     for _ in range(steps):
@@ -239,7 +236,7 @@ def _follow(following: NDArray[np.int32], steps: int) -> int:
     return i
 
 
-@njit
+@compiled
 def _multiply_add(values: NDArray[np.float64], factor: float, summand: float) -> None:
     for _ in range(_TIMES):
         for i in range(values.size):
@@ -252,7 +249,7 @@ def _multiply_add(values: NDArray[np.float64], factor: float, summand: float) ->
 def _add_min(kind: type[np.integer]) -> Callable[..., None]:
     """Make a kernel for whole numbers of a type, all of whose sums are of that type, too."""
 
-    @njit
+    @compiled
     def add_min(values: NDArray[np.integer], most: np.integer, summand: np.integer) -> None:
         for _ in range(_TIMES):
             for i in range(values.size):
@@ -264,7 +261,7 @@ def _add_min(kind: type[np.integer]) -> Callable[..., None]:
     return add_min
 
 
-@njit
+@compiled
 def _chained(values: NDArray[np.int32]) -> int:
     previous = 1 << 20
     for i in range(values.size):
@@ -272,7 +269,7 @@ def _chained(values: NDArray[np.int32]) -> int:
     return previous
 
 
-@njit
+@compiled
 def _leap(steps: int, start: float, slope: float, per: float) -> int:
     column = 0
     for _ in range(steps):
@@ -281,7 +278,7 @@ def _leap(steps: int, start: float, slope: float, per: float) -> int:
     return column
 
 
-@njit
+@compiled
 def _chained_sum(values: NDArray[np.float64]) -> float:
     total = 0.0
     for i in range(values.size):
@@ -289,37 +286,37 @@ def _chained_sum(values: NDArray[np.float64]) -> float:
     return total
 
 
-@njit
+@compiled
 def _exps(values: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     for i in range(values.size):
         out[i] = math.exp(-values[i])
 
 
-@njit
+@compiled
 def _logs(values: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     for i in range(values.size):
         out[i] = math.log(values[i])
 
 
-@njit
+@compiled
 def _sines(values: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     for i in range(values.size):
         out[i] = math.sin(values[i]) + math.cos(values[i])
 
 
-@njit
+@compiled
 def _roots(values: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     for i in range(values.size):
         out[i] = math.sqrt(values[i])
 
 
-@njit
+@compiled
 def _quotients(values: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     for i in range(values.size):
         out[i] = 1.0 / values[i]
 
 
-@njit
+@compiled
 def _keep(bits: NDArray[np.bool_], kept: NDArray[np.int64]) -> int:
     n = 0
     for i in range(bits.size):

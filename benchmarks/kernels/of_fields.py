@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import counts
@@ -17,11 +18,11 @@ from firstfix.fields import (
     endpoint_field,
     range_table,
     raycast,
+    sweep,
 )
 from firstfix.fields.distance import truncated_squares
 from firstfix.fields.map_fields import MapFields
-
-FIRST_POSES = 2000
+from firstfix.fields.sweep import Line, lines
 
 
 def kernels(fields: MapFields, rng: np.random.Generator) -> list[Kernel]:
@@ -31,7 +32,7 @@ def kernels(fields: MapFields, rng: np.random.Generator) -> list[Kernel]:
         _clearance(fields.grid),
         _pooled(fields),
         _walked(fields.grid, rng),
-        _table(fields, rng),
+        *_table(fields),
     ]
 
 
@@ -184,27 +185,79 @@ def leap_roofs(mean_cells: float, leaps: float, *others: tuple[Any, float]) -> d
     }
 
 
-def _table(fields: MapFields, rng: np.random.Generator) -> Kernel:
-    count, n = min(FIRST_POSES, len(fields.positions)), range_table.DIRECTIONS
-    chosen = np.sort(rng.choice(len(fields.positions), count, replace=False))
-    x, y = fields.positions.centres(chosen)
-    headings = np.arange(n) * (2 * np.pi / n)
-    dx, dy = np.cos(headings), np.sin(headings)
+def _table(fields: MapFields) -> list[Kernel]:
+    """Fill the table of ranges in one direction that crosses rows."""
+    x, y = fields.positions.centres(np.arange(len(fields.positions)))
+    rays = range_table._rays(fields.grid.occupied, x, y, upright=True)
+    height, width = fields.grid.cells.shape
+    both = [
+        lines(range_table.DIRECTIONS, height, upright=True, offset=offset)[9]
+        for offset in range_table._OFFSETS
+    ]
     per_cell = fields.grid.resolution / range_table.UNIT_M
-    table = np.empty((count, 2 * n), np.uint8)
-    each = np.repeat(x, n), np.repeat(y, n), np.tile(dx, count), np.tile(dy, count)
-    reach = np.full(count * n, range_table.FARTHEST / per_cell)
-    leaps = counts.leaps(fields.clearance, *each, reach)
-    range_table._fill(fields.clearance, x, y, dx, dy, per_cell, table)
-    mean_cells = float(table.mean()) / per_cell
+    reach = range_table.FARTHEST / per_cell
+    steps = range_table._count_steps(rays, both, reach)
+    line, found = both[0], np.empty(len(x), np.uint16)
+    far = np.uint16(2 * math.ceil(reach / line.per_row) + 3)
+    of_line = line.columns, line.turns, line.step, far
+    swept = rays.free, *of_line, rays.starts, rays.columns, found
+    return [
+        Kernel(
+            function=range_table._sweep,
+            parts=(sweep.next_row,),
+            unit="cell",
+            units=float(height * width),
+            call=lambda: range_table._sweep(*swept),
+            working_set=8.0 * width,
+            moved=STEP_BYTES,
+            operations=STEP_OPERATIONS,
+            roofs=step_roofs(width),
+        ),
+        _filled(fields, (x, y), line, steps, per_cell),
+    ]
+
+
+STEP_BYTES = 12
+"""Of a step of a sweep: 2 cells of the map; before and after 2 + 2, the row 2 + 2, copied 2."""
+
+STEP_OPERATIONS = 7
+
+
+def step_roofs(width: int) -> dict[str, Any]:
+    """Tell what holds a sweep back, which goes from row to row of so many cells."""
+    return {
+        "memory": ((limits.copy(8.0 * width), STEP_BYTES),),
+        "arithmetic": ((limits.operations("u16"), STEP_OPERATIONS),),
+    }
+
+
+def _filled(
+    fields: MapFields,
+    xy: tuple[NDArray[np.float64], NDArray[np.float64]],
+    line: Line,
+    steps: NDArray[np.uint16],
+    per_cell: float,
+) -> Kernel:
+    (x, y), (dx, dy), n = xy, line.direction, len(xy[0])
+    found, clearance = np.empty(n, np.uint8), fields.clearance
+    is_open = (steps[0] != steps[1]) | (steps[0] % 2 == 1)
+    free = np.maximum(0.0, (steps.min(axis=0) // 2 - 0.5001) * line.per_row)[is_open]
+    starts = x[is_open] + dx * free, y[is_open] + dy * free
+    rays = np.full(len(free), dx), np.full(len(free), dy), range_table.FARTHEST / per_cell - free
+    leaps = counts.leaps(clearance, *starts, *rays) / n
+    arguments = clearance, x, y, line.direction, line.per_row, steps, per_cell, found
+    range_table._fill(*arguments)
     return Kernel(
         function=range_table._fill,
-        parts=(raycast.cast_ray_leaping,),
-        unit="leap",
-        units=leaps,
-        call=lambda: range_table._fill(fields.clearance, x, y, dx, dy, per_cell, table),
-        working_set=(2.0 * mean_cells) ** 2,
-        moved=1 + 2 * count * n / leaps,
-        operations=LEAP_OPERATIONS,
-        roofs=leap_roofs(mean_cells, 1.0),
+        parts=(raycast.cast_ray_leaping, raycast.cast_ray_onward),
+        unit="range",
+        units=float(n),
+        call=lambda: range_table._fill(*arguments),
+        working_set=21.0 * n,
+        moved=21 + leaps,
+        operations=8 + LEAP_OPERATIONS * leaps,
+        roofs={
+            "memory": ((limits.copy(21.0 * n), 21),),
+            **leap_roofs(float(found.mean()) / per_cell, leaps),
+        },
     )

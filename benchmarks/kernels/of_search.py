@@ -8,8 +8,8 @@ from unittest import mock
 import counts
 import limits
 import numpy as np
+from compiled import compiled
 from kernel import Kernel
-from numba import njit
 from numpy.typing import NDArray
 from of_fields import LEAP_OPERATIONS, leap_roofs
 
@@ -228,7 +228,9 @@ def _descend_rays(best: NDArray[np.float64], beams: Beams, fields: MapFields) ->
     with mock.patch.object(refine, "_solve", wraps=refine._solve) as solved:
         call(refine._descend_rays.py_func)
     rounds = solved.call_count
-    leaps = _leaps_at(best, hits, ranges + beyond, fields) / (len(best) * len(hits))
+    leaps = counts.at_poses(fields.clearance, best, hits.bearings, ranges + beyond) / (
+        len(best) * len(hits)
+    )
     mean_cells = float(ranges.mean())
     return Kernel(
         function=refine._descend_rays,
@@ -250,20 +252,12 @@ def _descend_rays(best: NDArray[np.float64], beams: Beams, fields: MapFields) ->
     )
 
 
-def _leaps_at(
-    poses: NDArray[np.float64], beams: Beams, reach: NDArray[np.float64], fields: MapFields
-) -> int:
-    """Leaps of all beams at all poses."""
-    angles = poses[:, 2:] + beams.bearings
-    x, y = np.repeat(poses[:, 0], len(beams)), np.repeat(poses[:, 1], len(beams))
-    dx, dy = np.cos(angles).ravel(), np.sin(angles).ravel()
-    return counts.leaps(fields.clearance, x, y, dx, dy, np.tile(reach, len(poses)))
-
-
 def _verify(refined: NDArray[np.float64], beams: Beams, fields: MapFields) -> Kernel:
     used, resolution = beams.thinned(verify.BEAMS), fields.grid.resolution
     reach = (used.ranges + np.where(used.hit, verify._SHORT_LIMIT_M, 0.0)) / resolution
-    leaps = _leaps_at(refined, used, reach, fields) / (len(refined) * len(used))
+    leaps = counts.at_poses(fields.clearance, refined, used.bearings, reach) / (
+        len(refined) * len(used)
+    )
     mean_cells = float(reach.mean())
     return Kernel(
         function=verify._verify,
@@ -304,7 +298,7 @@ def _suppress(fields: MapFields, hits: Beams) -> Kernel:
 # The drivers below are not cached: a stale one would time a kernel of yesterday.
 
 
-@njit
+@compiled
 def _all_tiles(
     counts: NDArray[np.uint8],
     bases: NDArray[np.int64],
@@ -316,7 +310,7 @@ def _all_tiles(
         search._add_endpoints(counts, base, columns, offsets, ends)
 
 
-@njit
+@compiled
 def _all_positions(
     table: NDArray[np.uint8],
     directions: NDArray[np.int64],
@@ -330,7 +324,7 @@ def _all_positions(
         search._add_ranges(table[k], directions, measured, through, short, narrow, wide)
 
 
-@njit
+@compiled
 def _all_rows(
     rows: int,
     ends: NDArray[np.uint16],

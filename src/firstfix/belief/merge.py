@@ -64,7 +64,9 @@ def _merge(
     for i in order:
         taken = False
         for j in range(n):
-            turn = abs(poses[i, 2] - poses[kept[j], 2]) % FULL_TURN
+            turn = abs(poses[i, 2] - poses[kept[j], 2])
+            if turn >= FULL_TURN:  # rare, and a remainder takes longer than the rest of the loop
+                turn %= FULL_TURN
             if min(turn, FULL_TURN - turn) <= near_rad:
                 dx, dy = poses[i, 0] - poses[kept[j], 0], poses[i, 1] - poses[kept[j], 1]
                 if dx * dx + dy * dy <= near_cells * near_cells:
