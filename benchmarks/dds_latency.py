@@ -159,7 +159,7 @@ class NodeProcess:
         command = [sys.executable, "-m", "firstfix", "dds", *arguments]
         here = os.environ | {"CYCLONEDDS_URI": LOOPBACK, "ROS_DOMAIN_ID": f"{DOMAIN}"}
         self._process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=here)
-        self._log: Any = self._process.stderr
+        self._log = self._process.stderr or ()
         for line in self._log:
             if "SEARCHING" in line:
                 break

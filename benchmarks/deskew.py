@@ -23,7 +23,8 @@ from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.lab.simulation.floor import Floor
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.simulation.sweep import sweep
-from firstfix.lab.worlds.catalog import office, random_free_pose
+from firstfix.lab.worlds.catalog import random_free_pose
+from firstfix.lab.worlds.office import office
 
 PERIOD_S = 0.1
 PLACES = 60
@@ -76,7 +77,7 @@ def rms_errors(matcher: ScanMatcher, speed: float, turn_deg: float) -> list[floa
         if all(place is not None for place in found):
             errors.append([place.pose.distance_to(truth) for place in found if place is not None])
     near = np.array([row for row in errors if max(row) < 0.5])
-    return np.sqrt(np.mean(near**2, axis=0)).tolist()
+    return [float(error) for error in np.sqrt(np.mean(near**2, axis=0))]
 
 
 if __name__ == "__main__":

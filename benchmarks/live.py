@@ -153,7 +153,8 @@ def measure(server: Connection, url: str, viewers: int, seconds: float) -> None:
 
 def asked(server: Connection) -> tuple[float, float]:
     server.send("report")
-    return server.recv()
+    seconds, megabytes = server.recv()
+    return seconds, megabytes
 
 
 def search(url: str) -> None:

@@ -59,7 +59,7 @@ def main() -> None:
     for name in arguments.buildings:
         rng = np.random.default_rng(arguments.seed)
         grid, world = building(name)
-        matcher, counts = ScanMatcher(grid), Counter()
+        matcher, counts = ScanMatcher(grid), Counter[tuple[str, str]]()
         for truth in random_free_poses(world, rng, arguments.scans, 0.4):
             counts.update(outcomes(matcher, lidar, truth, world, rng))
         total.update(counts)

@@ -170,7 +170,7 @@ def two_lasers(grid: OccupancyGrid, seconds: float = 20.0) -> str:
         )
         T_odom_base = start.inverse() @ pose
         scans = rig.scans(grid, pose, rng, stamp)
-        given = [Odometry(stamp, T_odom_base), scans[0]]
+        given: list[LaserScan | Odometry] = [Odometry(stamp, T_odom_base), scans[0]]
         later = stamp + 0.005
         given += [Odometry(later, T_odom_base), replace(scans[1], stamp=later)]
         began = time.process_time()

@@ -27,6 +27,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -106,7 +107,7 @@ class Soak:
             for i in self._rng.permutation(len(HAPPENINGS)):
                 happening = HAPPENINGS[i]
                 if time.time() > quiet_until or happening not in KILLS_NODE:
-                    yield lambda happening=happening: happening(self)
+                    yield partial(happening, self)
 
     def _inject(self, happening: Callable[[], tuple[str, float]]) -> float:
         """Cause a fault; return the time of the next one."""

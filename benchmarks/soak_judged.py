@@ -179,11 +179,12 @@ def verdict(row: Row, before: Row | None) -> str:
 
 def goes_on(before: Row, row: Row) -> bool:
     """Return whether a pose continues the one before by odometry."""
-    expected = before["pose"]
+    expected: SE2 = before["pose"]
     if before["life"] == row["life"]:  # else odometry was restarted
         expected = expected @ (before["odom"].inverse() @ row["odom"])
     turned = angle_error(expected.yaw, row["pose"].yaw)
-    return expected.distance_to(row["pose"]) <= _STEP_M and turned <= _STEP_RAD
+    stepped = expected.distance_to(row["pose"])
+    return stepped <= _STEP_M and turned <= _STEP_RAD
 
 
 def wrong(row: Row, began: float) -> Row:
@@ -280,8 +281,8 @@ def answered(truth: Truth, main: Judged, quiet: list[tuple[float, float]]) -> Ro
 
 def right_share(truth: Truth, main: Judged) -> float:
     """Return the fraction of all sent scans with a right published pose."""
-    right = sum(row["verdict"] == "right" for row in main.rows)
-    return right / max(1, len(truth.scans))
+    right = [row for row in main.rows if row["verdict"] == "right"]
+    return len(right) / max(1, len(truth.scans))
 
 
 def spread(values: Iterable[float | None]) -> Row | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from compiled import compiled
@@ -155,7 +156,9 @@ def passes(weights: NDArray[np.float32], start: tuple[int, int]) -> int:
 
 
 @compiled
-def _passes(improve: object, weights: NDArray[np.float32], costs: NDArray[np.float32]) -> int:
+def _passes(
+    improve: Callable[..., bool], weights: NDArray[np.float32], costs: NDArray[np.float32]
+) -> int:
     height, width = weights.shape
     count, changed = 0, True
     while changed:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from compiled import compiled
@@ -22,6 +23,15 @@ SMALLEST, LARGEST = 16 * 1024, 256 * 1024 * 1024
 # So often arithmetic goes over its 4 KiB in a call, and reading over as many bytes as this.
 _TIMES = 16
 _AT_LEAST = 1024 * 1024
+
+
+_Number = np.integer[Any] | np.floating[Any]
+_INTEGERS: dict[str, type[np.integer[Any]]] = {
+    "u8": np.uint8,
+    "u16": np.uint16,
+    "i32": np.int32,
+    "i64": np.int64,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +71,7 @@ def level_of(size: float) -> str:
 
 
 def _rounded(size: float) -> int:
-    return min(LARGEST, max(SMALLEST, 2 ** round(math.log2(size))))
+    return min(LARGEST, max(SMALLEST, 1 << round(math.log2(size))))
 
 
 def read(size: float) -> Limit:
@@ -132,9 +142,9 @@ def _chase(size: int) -> Limit:
     return Limit(_name("reads in a chain", size), 20_000, lambda: _follow(following, 20_000))
 
 
-def _arithmetic(name: str, kind: type[np.generic], kernel: Callable[..., None]) -> Limit:
+def _arithmetic(name: str, kind: type[_Number], kernel: Callable[..., None]) -> Limit:
     values = np.ones(4096 // np.dtype(kind).itemsize, kind)
-    constants = kind(3), kind(1)  # type: ignore[call-arg]
+    constants = kind(3), kind(1)
     return Limit(name, values.size * 8 * _TIMES, lambda: kernel(values, *constants))
 
 
@@ -142,9 +152,9 @@ def _arithmetic(name: str, kind: type[np.generic], kernel: Callable[..., None]) 
 def operations(kind: str) -> Limit:
     """Additions and minima (of integers), multiplications and additions (else) of a type."""
     if kind in ("f32", "f64"):
-        floats = {"f32": np.float32, "f64": np.float64}[kind]
+        floats: type[_Number] = np.float32 if kind == "f32" else np.float64
         return _arithmetic(f"{kind} operations", floats, _multiply_add)
-    integers = {"u8": np.uint8, "u16": np.uint16, "i32": np.int32, "i64": np.int64}[kind]
+    integers = _INTEGERS[kind]
     return _arithmetic(f"{kind} operations", integers, _add_min(integers))
 
 
@@ -225,7 +235,7 @@ def _sum_at(values: NDArray[np.int32], places: NDArray[np.uint32]) -> int:
     total = np.int32(0)
     for i in range(places.size):
         total += values[places[i]]
-    return total
+    return int(total)
 
 
 @compiled

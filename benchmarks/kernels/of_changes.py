@@ -33,20 +33,20 @@ def _viewed(fields: MapFields, pose: SE2, scan: LaserScan) -> list[Kernel]:
     view = fields.clearance, fields.squares, marks, x, y, beams, longest
     of_views.mark_beams(*view)
     side = longest + 10.0
-    box = tuple(
-        min(size, max(0, round(at + off)))
-        for at, size in zip((y, x), marks.shape, strict=True)
-        for off in (-side, side)
+    (top, bottom), (left, right) = (
+        (max(0, round(at - side)), min(size, round(at + side)))
+        for at, size in zip((y, x), grid.cells.shape, strict=True)
     )
-    inside = slice(box[0], box[1]), slice(box[2], box[3])
+    box = top, bottom, left, right
+    inside = slice(top, bottom), slice(left, right)
     marked = marks[inside].copy()
-    counted = [np.zeros(marks.shape, np.uint16) for _ in range(3)]
+    hits, near, passes = (np.zeros(grid.cells.shape, np.uint16) for _ in range(3))
     steps = float(np.minimum(beams[:, 1], longest).mean()) / of_views._STEP
     around, share = (steps * of_views._STEP * 2.0) ** 2, float(np.mean(marked > 0))
 
     def add() -> None:
         marks[inside] = marked  # they are cleared
-        of_views.add_view(marks, *counted, box)
+        of_views.add_view(marks, hits, near, passes, box)
 
     return [
         Kernel(

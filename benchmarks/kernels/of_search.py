@@ -209,7 +209,9 @@ def _descend_rays(best: NDArray[np.float64], beams: Beams, fields: MapFields) ->
     beyond = refine._RAY_GATE_M / resolution + refine._BEYOND_GATE_CELLS
     information, variances = np.empty((len(best), 4, 4)), np.empty(len(best))
 
-    def call(kernel: Any = refine._descend_rays) -> None:
+    descend: Any = refine._descend_rays
+
+    def call(kernel: Any = descend) -> None:
         kernel(
             best.copy(),
             information,
@@ -226,7 +228,7 @@ def _descend_rays(best: NDArray[np.float64], beams: Beams, fields: MapFields) ->
         )
 
     with mock.patch.object(refine, "_solve", wraps=refine._solve) as solved:
-        call(refine._descend_rays.py_func)
+        call(descend.py_func)
     rounds = solved.call_count
     leaps = counts.at_poses(fields.clearance, best, hits.bearings, ranges + beyond) / (
         len(best) * len(hits)
