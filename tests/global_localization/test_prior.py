@@ -96,9 +96,9 @@ def test_a_place_near_the_prior_competes_with_all_that_the_search_ranks_as_high(
     scan = replace(LIDAR, T_base_laser=SE2.identity()).scan(grid, SE2(1.0, 1.0, 0.0), RNG)
     poses = np.column_stack([np.arange(400) * 10.0, np.full(400, 20.0), np.zeros(400)])
     for index, kept in ((30, 40), (3, 13), (395, 400)):
-        known = PlacePrior(Near(SE2(0.5 * index, 1.0, 0.0), 0.1), grid, scan, 180)
+        known = PlacePrior(Near(SE2(0.5 * index, 1.0, 0.0), 0.1), grid, scan, 12.0)
         assert (known.chosen(poses, 10) == poses[:kept]).all()
-    nothing = PlacePrior(Near(SE2(0.0, 1.0, 0.0), 0.1, 0.5), grid, scan, 180)
+    nothing = PlacePrior(Near(SE2(0.0, 1.0, 0.0), 0.1, 0.5), grid, scan, 12.0)
     assert len(nothing.chosen(poses + np.array([0.0, 0.0, 3.0]), 10)) == 10
 
 
@@ -109,9 +109,9 @@ def test_what_is_no_prior_is_refused(rooms, seen):
 
 def test_a_prior_multiplies_likelihoods():
     scores, logs = np.array([0.1, 0.5, 1.0, 2.0]), np.array([0.0, -0.5, -3.0, -6.9])
-    for beams in (12, 30, 500):
-        joint = log_likelihoods(with_prior(scores, logs, beams), beams)
-        np.testing.assert_allclose(joint, log_likelihoods(scores, beams) + logs, atol=1e-9)
+    for exponent in (4.8, 12.0, 17.0):
+        joint = log_likelihoods(with_prior(scores, logs, exponent), exponent)
+        np.testing.assert_allclose(joint, log_likelihoods(scores, exponent) + logs, atol=1e-9)
 
 
 def test_poses_of_the_base_are_those_of_each_pose_alone():

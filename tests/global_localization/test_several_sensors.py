@@ -62,6 +62,13 @@ def test_two_sensors_at_two_corners_find_the_robot(matcher, found):
         assert result.scans == tuple(scans)
 
 
+def test_sensors_count_by_how_often_they_look_to_all_sides(draw_room):
+    scans = two_scans(draw_room(0.05), TRUTH)
+    assert joint_beams(scans)[1].turns == pytest.approx(1.5, abs=0.01)
+    assert joint_beams(halves(scans[0]))[1].turns == pytest.approx(0.75, abs=0.01)
+    assert joint_beams(scans[:1])[1].turns == 1.0
+
+
 def test_the_order_of_sensors_does_not_matter(matcher, content_of):
     scans = two_scans(matcher.fields.grid, TRUTH)
     assert content_of(matcher.locate(scans)) == content_of(matcher.locate(scans[::-1]))

@@ -9,8 +9,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from firstfix.core.estimate import Evidence, Verdict
+from firstfix.global_localization.beams import Beams
 from firstfix.global_localization.verdict import (
+    EXPONENT,
     count_rivals,
+    exponent_of,
     judge,
     nothing_to_match,
     place_probabilities,
@@ -24,7 +27,7 @@ THROUGH = Evidence(explained=0.3, short=0.1, through_wall=0.6, unknown=0.0, beam
 
 @given(costs)
 def test_probabilities_are_shares_that_leave_room_for_another_place(scores):
-    p = place_probabilities(scores, 180)
+    p = place_probabilities(scores, EXPONENT)
     assert p.shape == scores.shape
     assert ((p >= 0.0) & (p <= 1.0)).all()
     assert p.sum() <= 1.0 + 1e-12
@@ -32,7 +35,7 @@ def test_probabilities_are_shares_that_leave_room_for_another_place(scores):
 
 @given(costs)
 def test_a_lower_cost_is_more_likely_and_an_equal_one_equally(scores):
-    p = place_probabilities(scores, 180)
+    p = place_probabilities(scores, EXPONENT)
     assert (np.diff(p) <= 0.0).all()
     same = np.diff(scores) == 0.0
     assert (np.diff(p)[same] == 0.0).all()
@@ -42,15 +45,17 @@ def test_a_lower_cost_is_more_likely_and_an_equal_one_equally(scores):
 def test_the_order_of_places_does_not_matter(scores, order):
     order = [i for i in order if i < len(scores)]
     np.testing.assert_allclose(
-        place_probabilities(scores[order], 180), place_probabilities(scores, 180)[order], rtol=1e-9
+        place_probabilities(scores[order], EXPONENT),
+        place_probabilities(scores, EXPONENT)[order],
+        rtol=1e-9,
     )
 
 
 @given(costs, st.floats(0.0, 8.0))
 def test_another_place_takes_its_share_from_all_alike(scores, cost):
     """The ratio of two places does not depend on what else is listed."""
-    before = place_probabilities(scores, 180)
-    after = place_probabilities(np.append(scores, cost), 180)[:-1]
+    before = place_probabilities(scores, EXPONENT)
+    after = place_probabilities(np.append(scores, cost), EXPONENT)[:-1]
     assert (after <= before + 1e-12).all()
     likely = before > 1e-200
     ratio = after[likely] / before[likely]
@@ -62,19 +67,19 @@ def test_a_place_that_fits_worse_becomes_less_likely(scores, i, more):
     i %= len(scores)
     worse = scores.copy()
     worse[i] += more
-    assert place_probabilities(worse, 180)[i] <= place_probabilities(scores, 180)[i]
+    assert place_probabilities(worse, EXPONENT)[i] <= place_probabilities(scores, EXPONENT)[i]
 
 
 @pytest.mark.parametrize("n", [2, 3, 8])
 def test_n_equal_places_share_alike(n):
-    p = place_probabilities(np.full(n, 0.2), 180)
+    p = place_probabilities(np.full(n, 0.2), EXPONENT)
     assert (p == p[0]).all()
     assert 0.9 / n < p[0] <= 1.0 / n
 
 
 def test_one_clear_place_is_nearly_certain_and_a_bad_one_is_nearly_nowhere():
-    assert place_probabilities(np.array([0.1, 1.5]), 180)[0] > 0.95
-    assert place_probabilities(np.array([4.0, 4.0]), 180).sum() < 0.05
+    assert place_probabilities(np.array([0.1, 1.5]), EXPONENT)[0] > 0.95
+    assert place_probabilities(np.array([4.0, 4.0]), EXPONENT).sum() < 0.05
 
 
 def judged(p, evidence=GOOD, limit=0.8):
@@ -121,14 +126,22 @@ def test_every_result_is_judged_in_words(shares, limit, evidence):
     assert reason
 
 
+def some_beams(n: int, turns: float = 1.0) -> Beams:
+    return Beams(np.linspace(0.0, 6.0, n), np.full(n, 2.0), np.full(n, True), turns=turns)
+
+
 def test_fewer_beams_are_less_sure():
     scores = np.array([0.2, 0.4, 0.6])
-    sure = [place_probabilities(scores, beams)[0] for beams in (8, 10, 20, 30)]
+    sure = [place_probabilities(scores, exponent_of(some_beams(n)))[0] for n in (8, 10, 20, 30)]
     assert sure == sorted(sure)
     assert sure[0] < 0.9 < sure[-1]
-    np.testing.assert_array_equal(
-        place_probabilities(scores, 30), place_probabilities(scores, 2000)
-    )
+    assert exponent_of(some_beams(30)) == exponent_of(some_beams(2000)) == EXPONENT
+
+
+def test_sensors_that_see_the_same_things_are_witnesses_but_not_independent_ones():
+    one, two = exponent_of(some_beams(60)), exponent_of(some_beams(120, turns=2.0))
+    assert one < two < 2.0 * one
+    assert exponent_of(some_beams(60, turns=0.5)) == one  # it is less, but never counted as less
 
 
 @given(st.integers(0, 30), st.integers(0, 7), st.integers(1, 8))

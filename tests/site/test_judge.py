@@ -12,7 +12,7 @@ from firstfix.core.estimate import Evidence, Hypothesis, Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
-from firstfix.global_localization.verdict import log_likelihoods, place_probabilities
+from firstfix.global_localization.verdict import EXPONENT, log_likelihoods, place_probabilities
 from firstfix.site.judge import MAP_EXPONENT, are_one_place, judge_site
 from firstfix.site.look import PROMISING, Looked
 from firstfix.site.places import SiteCandidates, SitePlace
@@ -28,7 +28,7 @@ PARTS = 12
 
 
 def log_of(cost: float) -> float:
-    best, wrong = log_likelihoods(np.array([cost, 2.3]), BEAMS)
+    best, wrong = log_likelihoods(np.array([cost, 2.3]), EXPONENT)
     return float(best - wrong)
 
 
@@ -72,7 +72,7 @@ def judged(*places: SitePlace, recall: float = 1.0, parts: int = 1):
 @pytest.mark.parametrize("costs", [[0.5], [0.5, 0.6], [1.2, 1.3, 2.0], [2.4]])
 def test_a_site_of_one_map_has_nearly_the_law_of_the_map(costs: list[float]) -> None:
     result = judged(*(place("a", cost, 3.0 * i) for i, cost in enumerate(costs)))
-    alone = place_probabilities(np.array(costs), BEAMS)
+    alone = place_probabilities(np.array(costs), EXPONENT)
     got = np.array([h.probability for h in result.hypotheses])
     # The map may be the wrong one: that counts once more.
     wrong_map = ((min(costs) + 0.2) / 2.5) ** MAP_EXPONENT
@@ -91,7 +91,7 @@ def test_another_map_is_a_rival_by_its_best_place() -> None:
 
 def test_no_place_is_surer_than_in_its_map_alone() -> None:
     places = [place("a", 0.5), place("a", 0.62, 3.0), place("b", 2.0)]
-    alone = place_probabilities(np.array([0.5, 0.62]), BEAMS)[0]
+    alone = place_probabilities(np.array([0.5, 0.62]), EXPONENT)[0]
     assert judged(*places).hypotheses[0].probability <= alone
 
 

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from firstfix.belief.view import Observation, motion
 from firstfix.core.estimate import Verdict
+from firstfix.global_localization.beams import Beams
 from firstfix.global_localization.prior import SHARE_OF_SMALL_VIEW, SHARE_WITHOUT_PRIOR
-from firstfix.global_localization.verdict import RIVAL_SHARE, place_probabilities
+from firstfix.global_localization.verdict import RIVAL_SHARE, exponent_of, place_probabilities
 
 # Mean cost of a beam up to which a view is explained at a place. The wrong map begins at 2.3.
 EXPLAINED_COST = 1.6
@@ -143,7 +144,7 @@ def judge(
         reason = "the most likely place does not explain the latest view"
         kept = known if stays else None
         return Judgement(Verdict.AMBIGUOUS, reason, kept, unexplained=True)
-    alone = seen.decides_alone and _alone(costs[:, -1], len(seen.beams)) >= ALONE_PROBABILITY
+    alone = seen.decides_alone and _alone(costs[:, -1], seen.beams) >= ALONE_PROBABILITY
     # A first view is judged by the law of single scans, which is known well, and is less strict.
     least = ALONE_PROBABILITY if alone and len(window) == 1 else rule.probability
     if not stays and (rule.missed > MOST_MISSED or probabilities[0] < least * rule.held):
@@ -165,9 +166,9 @@ def judge(
     return Judgement(Verdict.AMBIGUOUS, reason, favourite)
 
 
-def _alone(newest: NDArray[np.float64], beams: int) -> float:
+def _alone(newest: NDArray[np.float64], beams: Beams) -> float:
     """Return the probability of the best place by the newest view alone."""
-    return float(place_probabilities(newest, beams)[0])
+    return float(place_probabilities(newest, exponent_of(beams))[0])
 
 
 def _confirmed(known: Favourite, seen: Observation) -> bool:

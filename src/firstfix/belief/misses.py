@@ -7,7 +7,7 @@ from firstfix.belief.judge import ALONE_PROBABILITY, Judgement
 from firstfix.belief.tracks import Tracks
 from firstfix.belief.view import Observation
 from firstfix.global_localization.places import distinct_places
-from firstfix.global_localization.verdict import place_probabilities
+from firstfix.global_localization.verdict import exponent_of, place_probabilities
 
 MOST_MISSES = 2
 """After so many the robot has been moved, or its wheels have slipped: earlier views say nothing."""
@@ -49,4 +49,5 @@ def _is_decisive(entering: Tracks, seen: Observation) -> bool:
         return False
     costs = entering.costs[:, 0]
     places = distinct_places(entering.now, costs, seen.resolution, _COMPARED)
-    return float(place_probabilities(costs[places], len(seen.beams))[0]) >= ALONE_PROBABILITY
+    exponent = exponent_of(seen.beams)
+    return float(place_probabilities(costs[places], exponent)[0]) >= ALONE_PROBABILITY

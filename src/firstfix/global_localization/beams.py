@@ -36,12 +36,15 @@ class Beams:
         True where a surface returned the beam.
     origins : ndarray, shape (n, 2), or None
         Where the beams begin, m; None where all begin at the origin of the frame.
+    turns : float
+        How many times the sensors look to all sides, together: 1.5 for two of 270°.
     """
 
     bearings: NDArray[np.float64]
     ranges: NDArray[np.float64]
     hit: NDArray[np.bool_]
     origins: NDArray[np.float64] | None = None
+    turns: float = 1.0
 
     def __len__(self) -> int:
         return len(self.ranges)
@@ -77,7 +80,8 @@ class Beams:
     def take(self, index: NDArray[np.int64]) -> Beams:
         """Return the beams of these indices."""
         origins = None if self.origins is None else self.origins[index]
-        return Beams(self.bearings[index], self.ranges[index], self.hit[index], origins)
+        bearings, ranges, hit = self.bearings[index], self.ranges[index], self.hit[index]
+        return Beams(bearings, ranges, hit, origins, self.turns)
 
 
 def usable_beams(scan: LaserScan, longest_m: float = LONGEST_M) -> Beams:

@@ -29,6 +29,7 @@ from firstfix.global_localization.verdict import (
     DIFFERS_IN_LITTLE,
     RIVAL_SHARE,
     SEES_TOO_LITTLE,
+    exponent_of,
     judge,
     log_likelihoods,
     nothing_to_match,
@@ -79,7 +80,7 @@ def locate(
         return nothing_to_match(
             sum(map(len, scans)), hits, FEWEST_HITS, time.perf_counter() - started
         )
-    known = PlacePrior(prior, fields.grid, scan, len(beams))
+    known = PlacePrior(prior, fields.grid, scan, exponent_of(beams))
 
     depth = known.depth(config.shortlist)
     candidates, report = find_places(beams, fields, depth, config.max_poses)
@@ -93,7 +94,7 @@ def locate(
     result = LocateResult(verdict, reason, hypotheses, report, 0.0, scans=tuple(scans))
     if prior is not None:
         needed = SHARE_WITHOUT_PRIOR if see_enough(scans) else SHARE_OF_SMALL_VIEW
-        result = _with_share_of_prior(result, *places.by_scan_alone(len(beams)), needed)
+        result = _with_share_of_prior(result, *places.by_scan_alone(known.exponent), needed)
     return replace(result, elapsed_s=time.perf_counter() - started)
 
 
@@ -137,14 +138,14 @@ class _Places:
             )
         )
 
-    def by_scan_alone(self, beams: int) -> tuple[float, float]:
+    def by_scan_alone(self, exponent: float) -> tuple[float, float]:
         """Return, by the scan alone, the probability of its best place, and the ratio to it.
 
         The ratio is the likelihood of the best place by scan and prior over that of this one.
         """
         scores = self.verification.scores
-        alone = place_probabilities(scores[self.by_scan], beams)
-        logs = log_likelihoods(scores[[self.ranked[0], self.by_scan[0]]], beams)
+        alone = place_probabilities(scores[self.by_scan], exponent)
+        logs = log_likelihoods(scores[[self.ranked[0], self.by_scan[0]]], exponent)
         return float(alone[0]), float(np.exp(logs[0] - logs[1]))
 
 
@@ -166,7 +167,7 @@ def _best_of(
     best = []
     for scores in known.rankings(second_look):
         ranked = distinct_places(second_look.poses, scores, resolution, config.hypotheses)
-        best.append(ranked[: worth_listing(scores[ranked], len(beams))])
+        best.append(ranked[: worth_listing(scores[ranked], known.exponent)])
     kept: NDArray[np.float64] = second_look.poses[_united(best)]
     return kept
 
@@ -192,7 +193,7 @@ def _refined(
         np.concatenate([covariances, covariances]),
         ranked,
         by_scan,
-        place_probabilities(weighed[ranked], len(beams)),
+        place_probabilities(weighed[ranked], known.exponent),
     )
 
 
@@ -284,22 +285,22 @@ def _with_share_of_prior(
     return replace(result, verdict=verdict, reason=reason, probability_without_prior=alone)
 
 
-def worth_listing(scores: NDArray[np.float64], beams: int) -> int:
+def worth_listing(scores: NDArray[np.float64], exponent: float) -> int:
     """Return how many of some ranked places a result should list.
 
     Parameters
     ----------
     scores : ndarray, shape (n,)
         Mean cost of a beam at each place, best first, nats.
-    beams : int
-        Number of beams behind each mean.
+    exponent : float
+        Of the law of costs for the scan.
 
     Returns
     -------
     int
         `LISTED_PLACES`, or more if more are a hundredth as likely as the best.
     """
-    probabilities = place_probabilities(scores, beams)
+    probabilities = place_probabilities(scores, exponent)
     return max(
         LISTED_PLACES, int(np.count_nonzero(probabilities >= _LISTED_SHARE * probabilities[0]))
     )

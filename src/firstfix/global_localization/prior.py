@@ -71,14 +71,14 @@ class PlacePrior:
         The map.
     scan : LaserScan
         Of the sensor; has its pose on the robot.
-    beams : int
-        Number of beams behind the costs.
+    exponent : float
+        Of the law of costs for the scan.
     """
 
     prior: Prior | None
     grid: OccupancyGrid
     scan: LaserScan
-    beams: int
+    exponent: float
 
     def depth(self, shortlist: int) -> int:
         """Return how many places the search should list."""
@@ -106,7 +106,7 @@ class PlacePrior:
         scores = verification.scores
         if self.prior is None:
             return [scores]
-        return [with_prior(scores, self._logs(verification.poses), self.beams), scores]
+        return [with_prior(scores, self._logs(verification.poses), self.exponent), scores]
 
     def speaks_for(self, pose: NDArray[np.float64]) -> bool:
         """Return whether there is a prior, and a pose of shape (3,) is near it."""

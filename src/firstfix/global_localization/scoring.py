@@ -19,7 +19,7 @@ from firstfix.global_localization.beams import Beams
 from firstfix.global_localization.frames import to_cells
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.sensors import joint_beams
-from firstfix.global_localization.verdict import place_probabilities
+from firstfix.global_localization.verdict import exponent_of, place_probabilities
 from firstfix.global_localization.verify import (
     BEAMS,
     BeamClass,
@@ -170,7 +170,8 @@ def _alone(verification: Verification, i: int, beams: Beams, grid: OccupancyGrid
     x, y, _ = verification.poses[i]
     if not (-beyond <= x <= grid.width + beyond and -beyond <= y <= grid.height + beyond):
         return 0.0
-    return float(place_probabilities(verification.scores[[i]], len(beams))[0])
+    exponent = exponent_of(beams)
+    return float(place_probabilities(verification.scores[[i]], exponent)[0])
 
 
 def _held(

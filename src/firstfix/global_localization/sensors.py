@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from firstfix.core.angles import FULL_TURN
 from firstfix.core.arguments import as_pose
 from firstfix.core.errors import InputError
 from firstfix.core.scan import LaserScan
@@ -135,6 +136,7 @@ def joint_beams(scans: Sequence[LaserScan]) -> tuple[LaserScan, Beams]:
         ranges=np.concatenate([beams.ranges for beams in parts]),
         hit=np.concatenate([beams.hit for beams in parts]),
         origins=np.concatenate(origins),
+        turns=sum(map(covered_angle, scans)) / FULL_TURN,
     )
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.core.estimate import Evidence, LocateResult, SearchReport, Verdict
+from firstfix.global_localization.beams import Beams
 
 # The noise of a scan in a map (people, moved chairs, an imprecise drawing) is unknown beforehand.
 # Marginalised over this unknown scale (as Student's t comes from Gauss), the likelihood of a place
 # is a power of its mean cost: the ratio of two costs counts, not their difference. The exponent is
-# half the number of independent measurements in a scan, fewer if it has few beams; the floor is the
-# cost of sensor noise alone. docs/decisions/0005 has the measurements.
+# half the number of independent measurements in a scan, fewer if it has few beams, more if several
+# sensors see the same things from different places; the floor is the cost of sensor noise alone.
+# docs/decisions/0005 has the measurements.
 EXPONENT = 12.0
 _BEAMS_FOR_EXPONENT = 30
 _FLOOR = 0.2
@@ -36,29 +40,42 @@ DIFFERS_IN_LITTLE = (
 RIVAL_SHARE = 0.1
 
 
-def place_probabilities(scores: NDArray[np.float64], beams: int) -> NDArray[np.float64]:
+def exponent_of(beams: Beams) -> float:
+    """Return the exponent of the law for a scan, or for one of each sensor of a robot.
+
+    Parameters
+    ----------
+    beams : Beams
+        Behind a mean cost. Sensors that see the same things are several witnesses, but not
+        independent ones: the root of their turns counts.
+    """
+    enough = min(1.0, len(beams) / _BEAMS_FOR_EXPONENT)
+    return EXPONENT * enough * math.sqrt(max(1.0, beams.turns))
+
+
+def place_probabilities(scores: NDArray[np.float64], exponent: float) -> NDArray[np.float64]:
     """Turn the costs of separate places into probabilities.
 
     Parameters
     ----------
     scores : ndarray, shape (n,)
         Mean cost of a beam at each place, nats.
-    beams : int
-        Number of beams behind each mean.
+    exponent : float
+        Of `exponent_of`.
 
     Returns
     -------
     ndarray, shape (n,)
         Probability of each place; the rest to 1 is the probability of a place that is not listed.
     """
-    logs = log_likelihoods(np.append(scores, WRONG_MAP_COST), beams)
+    logs = log_likelihoods(np.append(scores, WRONG_MAP_COST), exponent)
     likelihoods: NDArray[np.float64] = np.exp(logs - logs.max())
     likelihoods /= likelihoods.sum()
     return likelihoods[:-1]
 
 
 def with_prior(
-    scores: NDArray[np.float64], logs: NDArray[np.float64], beams: int
+    scores: NDArray[np.float64], logs: NDArray[np.float64], exponent: float
 ) -> NDArray[np.float64]:
     """Return the costs whose likelihoods are those of the scan times those of a prior.
 
@@ -68,30 +85,28 @@ def with_prior(
         Mean cost of a beam at each place, nats.
     logs : ndarray, shape (n,)
         Log-likelihood of each place by the prior.
-    beams : int
-        Number of beams behind each mean.
+    exponent : float
+        Of `exponent_of`.
     """
-    exponent = EXPONENT * min(1.0, beams / _BEAMS_FOR_EXPONENT)
     costs: NDArray[np.float64] = (scores + _FLOOR) * np.exp(-logs / exponent) - _FLOOR
     return costs
 
 
-def log_likelihoods(scores: NDArray[np.float64], beams: int) -> NDArray[np.float64]:
+def log_likelihoods(scores: NDArray[np.float64], exponent: float) -> NDArray[np.float64]:
     """Turn mean costs into log-likelihoods, up to a constant.
 
     Parameters
     ----------
     scores : ndarray, shape (n,)
         Mean cost of a beam at each place, nats.
-    beams : int
-        Number of beams behind each mean.
+    exponent : float
+        Of `exponent_of`.
 
     Returns
     -------
     ndarray, shape (n,)
         Natural logarithms.
     """
-    exponent = EXPONENT * min(1.0, beams / _BEAMS_FOR_EXPONENT)
     logs: NDArray[np.float64] = -exponent * np.log(scores + _FLOOR)
     return logs
 

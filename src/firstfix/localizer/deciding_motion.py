@@ -13,7 +13,7 @@ from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan, Scans, as_scans
 from firstfix.core.se2 import SE2
 from firstfix.fields.raycast import expected_ranges
-from firstfix.global_localization.verdict import RIVAL_SHARE, log_likelihoods
+from firstfix.global_localization.verdict import EXPONENT, RIVAL_SHARE, log_likelihoods
 from firstfix.localizer.outputs import MotionRequest
 
 FARTHEST_M = 3.0
@@ -147,7 +147,7 @@ def _expected_entropy(views: NDArray[np.float64], weights: NDArray[np.float64]) 
     """Return the mean entropy after one view, over the places where the robot may be, nats."""
     differs = np.abs(views[:, None] - views[None]) > _DIFFERENT_M
     costs = _USUAL_COST + _DIFFERENT_COST * differs.mean(axis=2)
-    logs = log_likelihoods(costs, views.shape[1])
+    logs = log_likelihoods(costs, EXPONENT)
     posterior = weights * np.exp(logs - logs.max(axis=1, keepdims=True))
     posterior /= posterior.sum(axis=1, keepdims=True)
     return float(sum(w * _entropy(row) for w, row in zip(weights, posterior, strict=True)))

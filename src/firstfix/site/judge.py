@@ -27,6 +27,7 @@ from firstfix.global_localization.verdict import (
     EXPONENT,
     RIVAL_SHARE,
     SEES_TOO_LITTLE,
+    exponent_of,
     judge,
     place_probabilities,
 )
@@ -226,7 +227,7 @@ def _with_twins(places: Sequence[SitePlace]) -> list[SitePlace]:
 def _decides_alone(scans: Sequence[LaserScan], places: Sequence[SitePlace]) -> bool:
     """Tell whether the newest view of a sensor that sees much is enough."""
     costs = np.array([place.cost for place in places])
-    alone = place_probabilities(costs, len(joint_beams(scans)[1]))
+    alone = place_probabilities(costs, exponent_of(joint_beams(scans)[1]))
     return see_enough(scans) and bool(alone[0] >= ALONE_PROBABILITY)
 
 

@@ -19,7 +19,12 @@ from firstfix.global_localization.places import distinct_places
 from firstfix.global_localization.prior import DEEPER
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.sensors import joint_beams
-from firstfix.global_localization.verdict import WRONG_MAP_COST, log_likelihoods, with_prior
+from firstfix.global_localization.verdict import (
+    WRONG_MAP_COST,
+    exponent_of,
+    log_likelihoods,
+    with_prior,
+)
 from firstfix.global_localization.verify import verified_place, verify
 from firstfix.site.maps import Maps, PreparedMap
 from firstfix.site.places import SitePlace
@@ -62,11 +67,11 @@ class _Pool:
         """Return each map with the indices of its poses."""
         return [(i, np.flatnonzero(self.maps == i)) for i in np.unique(self.maps).tolist()]
 
-    def best(self, n: int, beams: int) -> _Pool:
+    def best(self, n: int, exponent: float) -> _Pool:
         """Keep the n best poses by the scan, and the n best with what is known before."""
         kept = np.argsort(self.costs, kind="stable")[:n]
         if self.logs.any():
-            weighed = with_prior(self.costs, self.logs, beams)
+            weighed = with_prior(self.costs, self.logs, exponent)
             kept = np.union1d(kept, np.argsort(weighed, kind="stable")[:n])
         return self.take(kept)
 
@@ -97,9 +102,10 @@ def search_one_look(
         return (), np.array([-np.inf])
     pool = _searched(query, map_ids, maps, scan, beams)
     pool = _refined(pool, map_ids, maps, beams)
-    pool = _distinct(pool, map_ids, maps, len(beams), CAREFUL_PLACES)
+    exponent = exponent_of(beams)
+    pool = _distinct(pool, map_ids, maps, exponent, CAREFUL_PLACES)
     pool = _compared(pool, map_ids, maps, beams)
-    pool = _distinct(pool, map_ids, maps, len(beams), LISTED_PLACES)
+    pool = _distinct(pool, map_ids, maps, exponent, LISTED_PLACES)
     places = [
         place
         for i, here in pool.by_map()
@@ -112,7 +118,7 @@ def _searched(
     query: SiteQuery, map_ids: Sequence[str], maps: Maps, scan: LaserScan, beams: Beams
 ) -> _Pool:
     """Search every map, and keep the best places of all."""
-    found = []
+    found, exponent = [], exponent_of(beams)
     # What is near a prior may be far down the list.
     is_hinted = any(query.prior_in(map_id) is not None for map_id in map_ids)
     depth = MAP_PLACES * DEEPER if is_hinted else MAP_PLACES
@@ -123,8 +129,8 @@ def _searched(
         logs = prior_logs(query, map_id, bases)
         index = np.full(len(logs), i)
         of_map = _Pool(index, candidates.poses, candidates.scores, logs)
-        found.append(of_map.best(MAP_PLACES, len(beams)))
-    return _joined(found).best(POOL_PLACES, len(beams))
+        found.append(of_map.best(MAP_PLACES, exponent))
+    return _joined(found).best(POOL_PLACES, exponent)
 
 
 def _joined(pools: Sequence[_Pool]) -> _Pool:
@@ -155,17 +161,17 @@ def _compared(pool: _Pool, map_ids: Sequence[str], maps: Maps, beams: Beams) -> 
     return replace(pool, costs=costs)
 
 
-def _distinct(pool: _Pool, map_ids: Sequence[str], maps: Maps, beams: int, most: int) -> _Pool:
+def _distinct(pool: _Pool, map_ids: Sequence[str], maps: Maps, exponent: float, most: int) -> _Pool:
     """Keep the best pose of each place, and the best places of all maps."""
     kept = []
     for i, here in pool.by_map():
         resolution = maps(map_ids[i]).fields.grid.resolution
-        weighed = with_prior(pool.costs[here], pool.logs[here], beams)
+        weighed = with_prior(pool.costs[here], pool.logs[here], exponent)
         kept += [
             here[distinct_places(pool.poses[here], costs, resolution, most)]
             for costs in ((pool.costs[here], weighed) if pool.logs.any() else (weighed,))
         ]
-    return pool.take(np.unique(np.concatenate(kept))).best(most, beams)
+    return pool.take(np.unique(np.concatenate(kept))).best(most, exponent)
 
 
 def _described(
@@ -183,7 +189,7 @@ def _described(
     covariances = np.concatenate([covariances, covariances])
     verification = verify(poses, beams, fields)
     costs = verification.scores
-    logs = log_likelihoods(np.append(costs, WRONG_MAP_COST), len(beams))
+    logs = log_likelihoods(np.append(costs, WRONG_MAP_COST), exponent_of(beams))
     before = prior_logs(query, map_id, bases_in_map(fields.grid, scan, poses))
     parts = part_costs(poses, beams, fields).tolist()
     return [

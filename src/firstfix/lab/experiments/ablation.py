@@ -35,7 +35,12 @@ from firstfix.global_localization.locate import (
 from firstfix.global_localization.places import distinct_places
 from firstfix.global_localization.refine import refine_on_field, refine_on_rays
 from firstfix.global_localization.search import Candidates, search
-from firstfix.global_localization.verdict import judge, nothing_to_match, place_probabilities
+from firstfix.global_localization.verdict import (
+    exponent_of,
+    judge,
+    nothing_to_match,
+    place_probabilities,
+)
 from firstfix.global_localization.verify import Verification, verified_place, verify
 from firstfix.lab.experiments.case import Case, evenly_spaced, known_truth
 from firstfix.lab.experiments.locate_bench import try_scan
@@ -122,7 +127,7 @@ class AblatedMatcher:
         if self._without is not Without.COST:
             resolution = fields.grid.resolution
             ranked = distinct_places(poses, verification.scores, resolution, config.hypotheses)
-        probabilities = place_probabilities(verification.scores[ranked], len(beams))
+        probabilities = place_probabilities(verification.scores[ranked], exponent_of(beams))
         verdict, reason = self._judged(scan, beams, verification, ranked, probabilities)
         if self._without in _NO_VERDICT:
             verdict, reason = Verdict.UNIQUE, "the best, whatever it is"
@@ -163,7 +168,7 @@ class AblatedMatcher:
         poses = poses[distinct_places(poses, scores, resolution, SECOND_LOOK_PLACES)]
         scores = verify(poses, beams, fields).scores
         ranked = distinct_places(poses, scores, resolution, config.hypotheses)
-        return poses[ranked[: worth_listing(scores[ranked], len(beams))]]
+        return poses[ranked[: worth_listing(scores[ranked], exponent_of(beams))]]
 
     def _sharpened(
         self, poses: NDArray[np.float64], beams: Beams
