@@ -7,15 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fleet_lab import scan_of
+from fleet_lab import narrow_views, scan_of
 
+from firstfix.core.estimate import Verdict
 from firstfix.core.se2 import SE2
 from firstfix.fleet import fleet as fleet_module
 from firstfix.fleet.engine import WorkerLostError
 from firstfix.fleet.fleet import Fleet, NotReadyError, UnknownMapError
-from firstfix.fleet.jobs import Prepare, ShardedSite, open_map, parts_for, run_job, spread
+from firstfix.fleet.jobs import Follow, Prepare, ShardedSite, open_map, parts_for, run_job, spread
 from firstfix.io.maps.site_yaml import read_site
 from firstfix.site.query import SiteQuery
+from firstfix.site.result import SiteResult
+from firstfix.site.site_belief import SiteBelief
 
 POSE = SE2(3.9, 1.7, 0.6)
 
@@ -132,6 +135,36 @@ def test_the_preparation_says_which_maps_are_done(here: tuple[Here, Fleet]) -> N
     done: list[str] = []
     asyncio.run(fleet.prepare(done.append))
     assert sorted(done) == list(fleet.map_ids)
+
+
+def test_a_robot_is_followed_over_all_parts_and_a_loss_changes_nothing(
+    here: tuple[Here, Fleet], rooms: Path, tmp_path: Path
+) -> None:
+    engine, fleet = here
+    one = ShardedSite(rooms, (fleet.map_ids,), tmp_path, 10**9)
+    whole = Fleet(Here(one), one.shards)
+    views = narrow_views("first")
+
+    async def answers(of: Fleet) -> list[SiteResult]:
+        await of.prepare()
+        belief, found = SiteBelief(), []
+        for view in views:
+            result, belief = await of.follow(belief, view)
+            found.append(result)
+        assert len(belief.views) == len(views)
+        return found
+
+    undisturbed = asyncio.run(answers(whole))
+    assert undisturbed[0].verdict is Verdict.AMBIGUOUS
+    assert (undisturbed[-1].verdict, undisturbed[-1].map_id) == (Verdict.UNIQUE, "first")
+    left = [True, True]
+    engine.losses = [lambda job: isinstance(job, Follow) and bool(left) and left.pop()] * 100
+    disturbed = asyncio.run(answers(fleet))
+    assert fleet.lost_jobs == 2
+    # The places of a single view are listed part by part.
+    for result, expected in zip(disturbed[1:], undisturbed[1:], strict=True):
+        assert (result.verdict, result.reason) == (expected.verdict, expected.reason)
+        assert result.map_probabilities == pytest.approx(expected.map_probabilities, abs=1e-9)
 
 
 def test_a_lost_job_is_given_again(here: tuple[Here, Fleet]) -> None:

@@ -10,7 +10,7 @@ from fleet_lab import as_message, scan_of
 
 from firstfix.core.errors import InputError
 from firstfix.core.se2 import SE2
-from firstfix.fleet.messages import read_query, read_robot_scans
+from firstfix.fleet.messages import read_query, read_robot_view
 from firstfix.io.maps.site_yaml import SiteMap
 from firstfix.site.query import SitePrior
 from firstfix.site.zones import zone_prior
@@ -26,7 +26,7 @@ def zones(name: str) -> SitePrior:
 def test_a_zone_is_a_prior() -> None:
     asked = {"scans": [as_message(scan_of("first", SE2(2.3, 2.1, 0.0)))], "zone": "hall"}
     query = read_query(json.dumps(asked).encode(), JSON, None, zones).query
-    _, _, prior = read_robot_scans(json.dumps({**asked, "odometry": [0, 0, 0]}).encode(), zones)
+    _, prior = read_robot_view(json.dumps({**asked, "odometry": [0, 0, 0]}).encode(), zones)
     for found in (query.prior, prior):
         assert found is not None
         assert list(found) == ["first"]

@@ -11,16 +11,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fleet_lab import FleetServer, as_message, scan_of
+from fleet_lab import FleetServer, as_message, narrow_views, scan_of
 from required import missing
 
 from firstfix.belief.prior import Near
 from firstfix.core.errors import InputError
+from firstfix.core.estimate import Verdict
 from firstfix.core.se2 import SE2
 from firstfix.fleet.fleet import Fleet, NotReadyError
 from firstfix.fleet.jobs import ShardedSite, spread
 from firstfix.io.maps.site_yaml import read_site
 from firstfix.site.query import SiteQuery
+from firstfix.site.site_belief import SiteBelief
 
 pytestmark = [
     pytest.mark.slow,
@@ -83,6 +85,10 @@ def test_queries_survive_the_loss_of_a_node(
         assert [await answer(fleet, room) for room in asked[:2]] == asked[:2]
         with pytest.raises(InputError, match="expected a prior on the map"):
             await fleet.locate(outside)
+        belief = SiteBelief()
+        for view in narrow_views("first"):
+            result, belief = await fleet.follow(belief, view)
+        assert (result.verdict, result.map_id) == (Verdict.UNIQUE, "first")
 
         running = [asyncio.create_task(answer(fleet, room)) for room in asked]
         await asyncio.sleep(0.05)

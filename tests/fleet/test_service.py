@@ -125,15 +125,33 @@ def test_views_of_a_robot_are_judged_together(server: FleetServer) -> None:
         assert (gone.status_code, gone.json()["detail"][:10]) == (404, "This robot")
 
 
-def test_too_many_robots_are_refused_and_the_known_ones_are_served(server: FleetServer) -> None:
+def test_a_new_robot_takes_the_place_of_the_most_silent_one(server: FleetServer) -> None:
     body = {"scans": [as_message(scan_of("first", POSE))], "odometry": [0.0, 0.0, 0.0]}
-    for name in ("a", "b", "c"):
+    for name in ("a", "b", "c", "a", "d"):
         assert server.http.post(f"/v1/robots/{name}/scans", json=body).status_code == 200
-    refused = server.http.post("/v1/robots/d/scans", json=body)
-    assert (refused.status_code, refused.headers["retry-after"]) == (429, "1")
-    assert server.http.post("/v1/robots/a/scans", json=body).status_code == 200
-    for name in ("a", "b", "c"):
+    assert server.http.get("/v1/robots").json()["robots"] == ["a", "c", "d"]
+    for name in ("a", "c", "d"):
         server.http.delete(f"/v1/robots/{name}")
+
+
+def test_what_does_not_follow_the_last_view_is_refused_and_the_robot_begins_anew(
+    server: FleetServer,
+) -> None:
+    scan = as_message(scan_of("first", POSE))
+    for x, stamp, status, views in (
+        (0.0, 5.0, 200, 1),
+        (0.5, 6.0, 200, 2),
+        (0.9, 2.0, 422, 0),  # older
+        (1.3, 7.0, 200, 1),
+    ):
+        body = {"scans": [{**scan, "stamp": stamp}], "odometry": [x, 0.0, 0.0]}
+        answer = server.http.post("/v1/robots/r2/scans", json=body)
+        assert answer.status_code == status, answer.text
+        assert answer.json().get("views", 0) == views
+    blind = {"scans": [{**scan, "ranges": [None] * 360}], "odometry": [1.7, 0.0, 0.0]}
+    answer = server.http.post("/v1/robots/r2/scans", json=blind).json()
+    assert (answer["verdict"], answer["views"]) == ("NO_MATCH", 1), "and nothing is lost"
+    server.http.delete("/v1/robots/r2")
 
 
 @pytest.mark.parametrize(

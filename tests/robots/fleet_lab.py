@@ -16,6 +16,7 @@ from typing import Any
 import httpx
 from site_lab import scan_in
 
+from firstfix.belief.view import View
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 
@@ -72,6 +73,12 @@ class FleetServer:
 @cache
 def scan_of(room: str, pose: SE2, seed: int = 0, **sensor: float) -> LaserScan:
     return scan_in(room, pose, seed, **sensor)
+
+
+def narrow_views(room: str) -> list[View]:
+    """Give views of a robot that turns, whose sensor sees too little from one pose."""
+    poses = [SE2(2.3, 2.1, 0.2 + 0.5 * i) for i in range(4)]
+    return [View.of(scan_of(room, pose, beams=91, fov=1.2), pose) for pose in poses]
 
 
 def as_message(scan: LaserScan) -> dict[str, Any]:

@@ -323,7 +323,7 @@ def _followed(belief: Belief, view: View) -> tuple[tuple[Observation, ...], Trac
     seen = Observation((view,), fields.grid.resolution)
     if not window:
         return (seen,), Tracks.none()
-    if _rests(window[-1], view):
+    if rests(window[-1], view):
         joined = window[-1].joined_by(view)
         return (*window[:-1], joined), at_rest(tracks, joined, fields)
     if belief.misses >= MOST_MISSES:
@@ -336,7 +336,8 @@ def _followed(belief: Belief, view: View) -> tuple[tuple[Observation, ...], Trac
     return (*window, seen), follow(tracks, window[-1], seen, fields)
 
 
-def _rests(newest: Observation, view: View) -> bool:
+def rests(newest: Observation, view: View) -> bool:
+    """Tell whether a view is taken where the latest was, so that it joins it."""
     step = newest.views[-1].T_odom_base.inverse() @ view.T_odom_base
     moved = math.hypot(step.x, step.y) > REST_M or abs(step.yaw) > REST_RAD
     return not moved and newest.same_sensors(view)

@@ -68,9 +68,9 @@ class Tracks:
         return cls(poses[:, None], cost[:, None], strain[:, None], rough, ids)
 
     @classmethod
-    def none(cls) -> Tracks:
-        """Make no tracks, over one view."""
-        return cls.at(np.empty((0, 3)), np.empty(0), np.empty(0, np.int64))
+    def none(cls, views: int = 1) -> Tracks:
+        """Make no tracks, over so many views."""
+        return cls.at(np.empty((0, 3)), np.empty(0), np.empty(0, np.int64)).over([0] * views)
 
     @property
     def now(self) -> NDArray[np.float64]:

@@ -29,12 +29,11 @@ from firstfix.fleet.messages import (
     Robots,
     encode,
     read_query,
-    read_robot_scans,
+    read_robot_view,
 )
 from firstfix.fleet.metrics import Metrics, as_text, new_registry
 from firstfix.fleet.openapi import document
 from firstfix.fleet.service import BusyError, Service
-from firstfix.fleet.sessions import RobotView, TooManyRobotsError
 from firstfix.web.access_control import AccessControl, AccessPolicy
 from firstfix.web.problem_details import HANDLERS, problem
 from firstfix.web.rate_limiter import RateLimiter
@@ -87,7 +86,6 @@ def make_app(
         exception_handlers={
             **HANDLERS,
             BusyError: _busy,
-            TooManyRobotsError: _too_many_robots,
             NotReadyError: _not_ready,
             UnknownMapError: _unknown_map,
         },
@@ -186,10 +184,7 @@ class _Api:
         name = _robot(request)
         media_type(request, JSON)
         body = await read_body(request)
-        scans, T_odom_base, prior = await asyncio.to_thread(
-            read_robot_scans, body, self._service.fleet.zone
-        )
-        view = RobotView(scans, T_odom_base)
+        view, prior = await asyncio.to_thread(read_robot_view, body, self._service.fleet.zone)
         return _json(await self._service.locate_robot(name, view, prior))
 
     def _health(self) -> Health:
@@ -220,10 +215,6 @@ def _json(content: Any, status: int = 200) -> Response:
 
 async def _busy(_: Request, error: Exception) -> Response:
     return problem(503, str(error), _AGAIN)
-
-
-async def _too_many_robots(_: Request, __: Exception) -> Response:
-    return problem(429, "Too many robots report. Try again when one is silent.", _AGAIN)
 
 
 async def _not_ready(_: Request, error: Exception) -> Response:

@@ -6,19 +6,21 @@ import asyncio
 import contextlib
 import time
 from collections import Counter
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeVar
 
+from firstfix.belief.view import View
 from firstfix.core.errors import InputError
 from firstfix.fleet.engine import Engine, WorkerLostError
-from firstfix.fleet.jobs import Done, Job, Look, Prepare, Search, WarmUp
+from firstfix.fleet.jobs import Done, Follow, Job, Look, Prepare, Search, WarmUp
 from firstfix.io.maps.site_yaml import SiteMap
 from firstfix.site.judge import judge_site
 from firstfix.site.look import Looked, look_at_all
 from firstfix.site.query import SitePrior, SiteQuery
 from firstfix.site.result import SiteResult
+from firstfix.site.site_belief import SiteBelief, believe, is_blind, maps_to_follow, with_view
 from firstfix.site.zones import zone_prior
 
 T = TypeVar("T")
@@ -131,9 +133,7 @@ class Fleet:
         """
         started = time.perf_counter()
         parts = self._usable(query, only)
-        copy = min(range(self.copies), key=lambda i: self._running[i])
-        self._running[copy] += 1
-        try:
+        with self._copy() as copy:
             if only is None:
                 looked = await self._all(copy, [(i, Look(query, names)) for i, names in parts])
             else:
@@ -146,9 +146,62 @@ class Fleet:
                 found = [done.result]
             else:
                 found = await self._all(copy, searches)
+        return self._timed(await asyncio.to_thread(judge_site, query, looked, found), started)
+
+    async def follow(
+        self, belief: SiteBelief, view: View, prior: SitePrior | None = None
+    ) -> tuple[SiteResult, SiteBelief]:
+        """Find the map and the place of a robot by all that is known of it.
+
+        Parameters
+        ----------
+        belief : SiteBelief
+            From the view before; ``SiteBelief()`` for a robot that is new.
+        view : View
+            The newest.
+        prior : mapping of str to Prior or None, optional
+            What is known at this view.
+
+        Returns
+        -------
+        SiteResult
+            One verdict over all maps.
+        SiteBelief
+            For the next view.
+
+        Raises
+        ------
+        UnknownMapError, InputError, NotReadyError
+            As `locate`.
+        """
+        if is_blind(view):
+            return await self.locate(SiteBelief(((view,),)).newest), belief
+        belief = with_view(belief, view, prior)
+        if len(belief.views) == 1:
+            return await self.locate(belief.newest), belief
+        started = time.perf_counter()
+        query = belief.newest if belief.is_followed else belief.query
+        parts = self._usable(query, None)
+        with self._copy() as copy:
+            looked = await self._all(copy, [(i, Look(query, names)) for i, names in parts])
+            followed = set(maps_to_follow(belief, looked))
+            chosen = [(i, tuple(n for n in names if n in followed)) for i, names in parts]
+            jobs = [(i, Follow(belief.of_maps(names), names)) for i, names in chosen if names]
+            found = await self._all(copy, jobs)
+        result, belief = await asyncio.to_thread(believe, belief, looked, found)
+        return self._timed(result, started), belief
+
+    @contextlib.contextmanager
+    def _copy(self) -> Iterator[int]:
+        """Give the number of the copy of the site that has least to do."""
+        copy = min(range(self.copies), key=lambda i: self._running[i])
+        self._running[copy] += 1
+        try:
+            yield copy
         finally:
             self._running[copy] -= 1
-        result = await asyncio.to_thread(judge_site, query, looked, found)
+
+    def _timed(self, result: SiteResult, started: float) -> SiteResult:
         return replace(
             result,
             faults=tuple(self.faults.values()),

@@ -17,6 +17,7 @@ from firstfix.site.look import Looked
 from firstfix.site.places import SiteCandidates
 from firstfix.site.query import SiteQuery
 from firstfix.site.site import Site
+from firstfix.site.site_belief import Followed, SiteBelief
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
@@ -87,6 +88,18 @@ class Search:
     def run(self, site: Site) -> SiteCandidates:
         """Do it."""
         return site.search(self.query, self.map_ids)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Follow:
+    """Weigh the places of a robot in maps by its newest view."""
+
+    belief: SiteBelief
+    map_ids: tuple[str, ...]
+
+    def run(self, site: Site) -> Followed:
+        """Do it."""
+        return site.follow(self.belief, self.map_ids)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

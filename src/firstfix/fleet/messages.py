@@ -12,6 +12,8 @@ import msgspec
 from msgspec import Meta, Struct
 
 from firstfix.belief.prior import Near
+from firstfix.belief.several import distinct_views
+from firstfix.belief.view import View
 from firstfix.core.errors import InputError
 from firstfix.core.estimate import Evidence, Verdict
 from firstfix.core.scan import MAX_BEAMS, LaserScan
@@ -208,12 +210,11 @@ def read_query(body: bytes, kind: str, map_id: str | None, zones: Zones) -> Aske
     return Asked(query, asked.map or map_id)
 
 
-def read_robot_scans(
-    body: bytes, zones: Zones
-) -> tuple[tuple[LaserScan, ...], SE2, SitePrior | None]:
-    """Read the body of ``POST /v1/robots/{id}/scans``: scans, odometry, prior."""
+def read_robot_view(body: bytes, zones: Zones) -> tuple[View, SitePrior | None]:
+    """Read the body of ``POST /v1/robots/{id}/scans``: what was seen, and what is known."""
     asked: RobotScans = decode(body, RobotScans)
-    return _laser_scans(asked.scans), SE2(*asked.odometry), _prior(asked, zones)
+    scans, T_odom_base = _laser_scans(asked.scans), SE2(*asked.odometry)
+    return distinct_views(scans, [T_odom_base] * len(scans))[-1], _prior(asked, zones)
 
 
 def _prior(asked: LocateScans | RobotScans, zones: Zones) -> SitePrior | None:

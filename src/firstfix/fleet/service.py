@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
+from firstfix.belief.view import View
+from firstfix.core.errors import InputError
 from firstfix.core.settings import check_settings, setting
 from firstfix.fleet.fleet import Fleet, NotReadyError
 from firstfix.fleet.messages import Asked
-from firstfix.fleet.sessions import Robot, RobotView, Sessions, with_view
-from firstfix.site.query import SitePrior, SiteQuery
+from firstfix.fleet.sessions import Sessions
+from firstfix.site.query import SitePrior
+from firstfix.site.result import SiteResult
+from firstfix.site.site_belief import SiteBelief
+
+T = TypeVar("T")
 
 
 class BusyError(Exception):
@@ -64,47 +70,54 @@ class Service:
         NotReadyError
             If there is no answer now.
         """
-        async with self._place_in_queue():
-            try:
-                result = await asyncio.wait_for(
-                    self.fleet.locate(asked.query, asked.only), self.config.answer_s
-                )
-            except asyncio.TimeoutError:
-                raise NotReadyError(
-                    f"There was no answer within {self.config.answer_s:g} s. Try again later."
-                ) from None
-        self.verdicts[result.verdict.value] += 1
-        return result.to_dict()
+        result = await self._in_time(self.fleet.locate(asked.query, asked.only))
+        return self._counted(result)
 
-    async def locate_robot(
-        self, name: str, view: RobotView, prior: SitePrior | None
-    ) -> dict[str, Any]:
+    async def locate_robot(self, name: str, view: View, prior: SitePrior | None) -> dict[str, Any]:
         """Judge a view of a robot together with its last ones.
 
         Raises
         ------
-        TooManyRobotsError
-            If the robot is new and there are too many.
         BusyError
-            If the last scan of this robot is still judged.
+            If too many queries wait, or the last scan of this robot is still judged.
+        InputError
+            If the view does not follow the one before, or the prior does not fit its map: the robot
+            begins anew.
+        NotReadyError
+            If there is no answer now.
         """
-        robot: Robot = self.sessions.report(name)
+        robot = self.sessions.report(name)
         if robot.turn.locked():
             raise BusyError("The scan before is still judged. Send one at a time.")
         async with robot.turn:
-            views = with_view(robot.views, view)
-            query = SiteQuery.of(
-                [scan for each in views for scan in each.scans],
-                [each.T_odom_base for each in views for _ in each.scans],
-                prior,
-            )
-            answer = await self.locate(Asked(query))
-            robot.views, robot.answer = views, {**answer, "views": len(views)}
+            try:
+                result, robot.belief = await self._in_time(
+                    self.fleet.follow(robot.belief, view, prior)
+                )
+            except InputError:
+                robot.belief = SiteBelief()
+                raise
+            robot.answer = {**self._counted(result), "views": len(robot.belief.views)}
         return robot.answer
 
+    def _counted(self, result: SiteResult) -> dict[str, Any]:
+        self.verdicts[result.verdict.value] += 1
+        return result.to_dict()
+
+    async def _in_time(self, answer: Coroutine[Any, Any, T]) -> T:
+        """Wait for an answer, in the queue and for a limited time."""
+        async with self._place_in_queue(answer):
+            try:
+                return await asyncio.wait_for(answer, self.config.answer_s)
+            except asyncio.TimeoutError:
+                raise NotReadyError(
+                    f"There was no answer within {self.config.answer_s:g} s. Try again later."
+                ) from None
+
     @asynccontextmanager
-    async def _place_in_queue(self) -> AsyncIterator[None]:
+    async def _place_in_queue(self, answer: Coroutine[Any, Any, Any]) -> AsyncIterator[None]:
         if self.waiting >= self.config.most_waiting:
+            answer.close()  # it was never begun
             raise BusyError("Too many queries are waiting. Try again in a second.")
         self.waiting += 1
         try:

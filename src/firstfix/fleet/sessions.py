@@ -1,34 +1,15 @@
-"""What the service remembers of each robot: its last views, for a joint verdict."""
+"""What the service remembers of each robot: where it may be."""
 
 from __future__ import annotations
 
 import asyncio
-import math
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from firstfix.belief.belief import NEWS_M, NEWS_RAD
-from firstfix.belief.several import LONGEST_STEP_M
-from firstfix.core.scan import LaserScan
-from firstfix.core.se2 import SE2
-
-VIEWS = 4
-"""Views of a robot that are judged together. Each is searched anew, so more take longer."""
-
-
-class TooManyRobotsError(Exception):
-    """No more robots can be remembered."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class RobotView:
-    """The scans of one time, and ``T_odom_base`` then."""
-
-    scans: tuple[LaserScan, ...]
-    T_odom_base: SE2
+from firstfix.site.site_belief import SiteBelief
 
 
 @dataclass(eq=False, slots=True)
@@ -37,8 +18,8 @@ class Robot:
 
     Parameters
     ----------
-    views : tuple of RobotView
-        The last ones that brought news, oldest first.
+    belief : SiteBelief
+        Where it may be; at most about 1 MB, and some kB once it is found.
     answer : dict or None
         The last answer.
     seen : float
@@ -47,42 +28,10 @@ class Robot:
         Held while a scan of this robot is judged.
     """
 
-    views: tuple[RobotView, ...] = ()
+    belief: SiteBelief = field(default_factory=SiteBelief)
     answer: dict[str, Any] | None = None
     seen: float = 0.0
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
-
-
-def with_view(views: Sequence[RobotView], view: RobotView) -> tuple[RobotView, ...]:
-    """Add a view to those of a robot.
-
-    Parameters
-    ----------
-    views : sequence of RobotView
-        Those before, oldest first.
-    view : RobotView
-        The newest.
-
-    Returns
-    -------
-    tuple of RobotView
-        At most `VIEWS`. A view from the pose of the one before replaces it; where the odometry
-        jumped, it was started anew, and nothing before counts.
-    """
-    if not views:
-        return (view,)
-    step = views[-1].T_odom_base.inverse() @ view.T_odom_base
-    moved = math.hypot(step.x, step.y)
-    if moved > LONGEST_STEP_M:
-        return (view,)
-    has_news = len(views) == 1 or _brings_news(views[-2], views[-1])
-    kept = views if has_news else views[:-1]
-    return (*kept, view)[-VIEWS:]
-
-
-def _brings_news(before: RobotView, view: RobotView) -> bool:
-    step = before.T_odom_base.inverse() @ view.T_odom_base
-    return math.hypot(step.x, step.y) >= NEWS_M or abs(step.yaw) >= NEWS_RAD
 
 
 class Sessions:
@@ -91,7 +40,8 @@ class Sessions:
     Parameters
     ----------
     most : int
-        Number of robots at most.
+        Number of robots at most; for a new one the one that has been silent for longest is
+        forgotten.
     idle_s : float
         A robot that reports nothing for so long is forgotten, s.
     clock : callable
@@ -119,19 +69,13 @@ class Sessions:
         return self._robots.get(name)
 
     def report(self, name: str) -> Robot:
-        """Return a robot that reports now, known or new.
-
-        Raises
-        ------
-        TooManyRobotsError
-            If it is new and there are too many.
-        """
+        """Return a robot that reports now, known or new."""
         self._forget_idle()
-        if name not in self._robots and len(self._robots) >= self._most:
-            raise TooManyRobotsError
         # The order of the robots is that of their last reports.
         robot = self._robots.setdefault(name, Robot())
         self._robots.move_to_end(name)
+        if len(self._robots) > self._most:
+            self._robots.popitem(last=False)
         robot.seen = self._clock()
         return robot
 

@@ -19,6 +19,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.cache import remove_unused
 from firstfix.fields.map_fields import MapFields
 from firstfix.io.maps.site_yaml import SiteDescription, SiteMap, Transition, read_site
+from firstfix.site.follow import follow
 from firstfix.site.judge import judge_site
 from firstfix.site.look import PROMISING, Looked, look_at_all, look_at_maps
 from firstfix.site.maps import PreparedMaps
@@ -26,6 +27,7 @@ from firstfix.site.places import SiteCandidates, SitePlace
 from firstfix.site.query import SitePrior, SiteQuery
 from firstfix.site.result import SiteResult
 from firstfix.site.search import search_one_look
+from firstfix.site.site_belief import Followed, SiteBelief
 from firstfix.site.surroundings import surroundings
 from firstfix.site.views import search_views
 from firstfix.site.zones import zone_prior
@@ -287,6 +289,33 @@ class Site:
             searched=tuple(usable),
             faults=self._faults_of(self._entries),
         )
+
+    def follow(self, belief: SiteBelief, map_ids: Sequence[str]) -> Followed:
+        """Weigh the places of a robot in some of the maps by its newest view.
+
+        Parameters
+        ----------
+        belief : SiteBelief
+            With the newest view.
+        map_ids : sequence of str
+            Some of the maps.
+
+        Raises
+        ------
+        InputError
+            If one of the maps is not in the site.
+        """
+        usable = [name for name in map_ids if self._is_usable(self._entry(name))]
+        if not usable:
+            nothing = np.full(1 if belief.is_followed else len(belief.views), -np.inf)
+            return Followed(SiteCandidates((), nothing, (), self._faults_of(map_ids)), {})
+        followed = follow(belief, usable, self._maps.get)
+        found = replace(
+            followed.found,
+            places=self._with_surroundings(followed.found.places),
+            faults=self._faults_of(self._entries),
+        )
+        return replace(followed, found=found)
 
     def _faults_of(self, map_ids: Iterable[str]) -> tuple[str, ...]:
         return tuple(self._faults[name] for name in map_ids if name in self._faults)
