@@ -17,18 +17,18 @@ from required import missing
 
 
 @pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
+def chromium() -> Iterator[page_lab.Profiles]:
     """Give a browser; for a module, because its event loop is in the way of others."""
     if why := page_lab.why_missing():
         missing("browser", why)
     with page_lab.chromium() as browser:
-        yield browser
+        yield page_lab.Profiles(browser)
 
 
 @pytest.fixture
-def visit(chromium: Any) -> Iterator[Callable[..., page_lab.Visit]]:
+def visit(chromium: page_lab.Profiles) -> Iterator[Callable[..., page_lab.Visit]]:
     """Give a function that opens a page; none of them may have logged an error."""
-    contexts, visits = [], []
+    visits: list[page_lab.Visit] = []
 
     def open_page(
         url: str,
@@ -37,13 +37,13 @@ def visit(chromium: Any) -> Iterator[Callable[..., page_lab.Visit]]:
         is_invited: bool = False,
         **options: Any,
     ) -> page_lab.Visit:
-        contexts.append(chromium.new_context(**device, **options))
-        visits.append(page_lab.Visit(contexts[-1], url, is_invited=is_invited))
+        profile = chromium.like_new(url, **device, **options)
+        visits.append(page_lab.Visit(profile, url, is_invited=is_invited))
         return visits[-1]
 
     yield open_page
-    for context in contexts:
-        context.close()
+    for visited in visits:
+        visited.page.close()
     assert [problem for visited in visits for problem in visited.problems] == []
 
 
