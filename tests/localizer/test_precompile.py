@@ -10,7 +10,7 @@ from firstfix.amcl.config import AmclConfig, MotionModel, SensorModel
 from firstfix.localizer.inputs import Input
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Output
-from firstfix.localizer.precompile import precompile
+from firstfix.localizer.precompile import _run, precompile
 from firstfix.localizer.states import State
 
 # A robot is found in a hall, driven, lost and found again, and then in one of two equal rooms.
@@ -65,13 +65,23 @@ assert not late, late
 """
 
 
-def test_it_returns_nothing_and_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+@pytest.fixture
+def afresh():
+    """As in a new process."""
+    _run.cache_clear()
+
+
+def test_it_returns_nothing_and_leaves_no_file(
+    afresh: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     monkeypatch.setenv("FIRSTFIX_CACHE_DIR", str(tmp_path))
     assert precompile(AmclConfig()) is None
     assert list(tmp_path.iterdir()) == []
 
 
-def test_its_story_passes_through_finding_tracking_and_doubt(monkeypatch: pytest.MonkeyPatch):
+def test_its_story_passes_through_finding_tracking_and_doubt(
+    afresh: None, monkeypatch: pytest.MonkeyPatch
+):
     """Or kernels of one of them would be left to the first scans of a robot."""
     states, handle = set(), Localizer.handle
 
@@ -84,6 +94,14 @@ def test_its_story_passes_through_finding_tracking_and_doubt(monkeypatch: pytest
     precompile()
     found = {State.LOCALIZED, State.DISAMBIGUATING, State.SEARCHING, State.VERIFYING_HINT}
     assert found <= states
+
+
+def test_what_is_compiled_is_not_compiled_again(monkeypatch: pytest.MonkeyPatch):
+    precompile()
+    monkeypatch.setattr(Localizer, "handle", lambda *_: pytest.fail("it was run again"))
+    precompile()
+    with pytest.raises(pytest.fail.Exception):
+        precompile(AmclConfig(laser_model_type=SensorModel.BEAM, max_beams=11))
 
 
 @pytest.mark.slow

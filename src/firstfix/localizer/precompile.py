@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import cache
 
 from firstfix.amcl.config import AmclConfig
 from firstfix.core.grid import OccupancyGrid
@@ -32,6 +33,8 @@ _SCANS = 30
 def precompile(config: AmclConfig | None = None, methods: Iterable[Method] = ()) -> None:
     """Run a localizer, and a search by each of some other methods, in a small room.
 
+    Does nothing where this process has done the same before.
+
     Parameters
     ----------
     config : AmclConfig, optional
@@ -43,7 +46,12 @@ def precompile(config: AmclConfig | None = None, methods: Iterable[Method] = ())
     --------
     >>> ff.precompile()
     """
-    localizer = Localizer(LocalizerConfig(amcl=config or AmclConfig()))
+    _run(config or AmclConfig(), frozenset(methods))
+
+
+@cache
+def _run(config: AmclConfig, methods: frozenset[Method]) -> None:
+    localizer = Localizer(LocalizerConfig(amcl=config))
     grid = small_room()
     localizer.handle(NewMap(0.0, grid))
     for i in range(_SCANS):
