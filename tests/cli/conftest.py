@@ -28,6 +28,18 @@ class Ended:
     out: str
     err: str
 
+    def assert_one_sentence(self, *words: str) -> None:
+        """Assert that the command was refused in one sentence with these words."""
+        assert (self.status, self.out) == (2, ""), self
+        assert self.err.startswith("firstfix: ")
+        assert self.err.count("\n") == 1
+        for word in words:
+            assert word in self.err
+
+    def assert_refused(self, *words: str) -> None:
+        """Assert that one sentence says what is expected, what was received, and what to do."""
+        self.assert_one_sentence("firstfix: expected ", ", received ", "; ", *words)
+
 
 Cli = Callable[..., Ended]
 

@@ -106,34 +106,3 @@ def test_cases_that_cannot_be_spliced_are_named(cli, drive: Path, cases: Path) -
     assert "drive (no drive of 20 s" in ended.err
     assert "unique (no odometry)" in ended.err
     assert ended.err.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    ("options", "word"),
-    [
-        (["--kidnap", "--wrong-map"], "--wrong-map"),
-        (["--kidnap", "--method", "paper"], "--method"),
-        (["--kidnap", "--limit", "3"], "--limit"),
-        (["--kidnap", "--params", "amcl.yaml"], "--params"),
-        (["--kidnap", "--worlds", "office,moon"], "'moon'"),
-        (["--kidnap", "--worlds", ""], "''"),
-        (["--kidnap", "--cases", "nowhere"], "nowhere"),
-        (["--kidnap", "--worlds", "house", "--out", "file/b.json"], "file/b.json"),
-        (["--kidnap", "--worlds", "house", "--report", "file/out"], "file/out"),
-        (["--scenarios", "3"], "--kidnap"),
-        (["--worlds", "office"], "--kidnap"),
-        (["--track", "--kidnap"], "--kidnap"),
-        (["--track", "--scenarios", "3"], "--scenarios"),
-        (["--track"], "CASES"),
-        ([], "CASES"),
-    ],
-)
-def test_options_that_do_not_fit_are_refused(
-    cli, tmp_path: Path, options: list[str], word: str
-) -> None:
-    (tmp_path / "file").write_text("in the way")
-    ended = cli("bench", *options)
-    assert (ended.status, ended.out) == (2, "")
-    assert ended.err.startswith("firstfix: expected ")
-    assert ended.err.count("\n") == 1
-    assert word in ended.err

@@ -34,21 +34,3 @@ def test_scans_are_located_by_every_sensor(cli, cases: Path, tmp_path: Path) -> 
     assert whole["unique"] == 1.0
     assert narrow["unique"] < 1.0
     assert "wrong when UNIQUE" in ended.out
-
-
-@pytest.mark.parametrize(
-    ("options", "word"),
-    [
-        (["--starts"], "CASES"),
-        (["somewhere", "--starts", "--track"], "--track"),
-        (["somewhere", "--starts", "--limit", "2"], "--limit"),
-        (["somewhere", "--sensor", "60"], "--sensor FOV,RANGE"),
-        (["--kidnap", "--sensor", "wide"], "'wide'"),
-    ],
-)
-def test_options_that_do_not_fit_are_refused(cli, options: list[str], word: str) -> None:
-    ended = cli("bench", *options)
-    assert (ended.status, ended.out) == (2, "")
-    assert ended.err.startswith("firstfix: expected ")
-    assert ended.err.count("\n") == 1
-    assert word in ended.err

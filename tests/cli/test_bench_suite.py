@@ -47,35 +47,3 @@ def test_costs_of_one_office_are_measured(
     assert [row["beams"] for row in document["beams"]] == [100, 100]
     assert [row["threads"] for row in document["threads"]] == [1, 2]
     assert (tmp_path / "out" / "scaling.png").exists()
-
-
-@pytest.mark.parametrize(
-    ("options", "word"),
-    [
-        (["--suite", "paper", "--worlds", "moon"], "'moon'"),
-        (["--suite", "paper", "--wrong-map"], "--wrong-map"),
-        (["--suite", "paper", "--limit", "3"], "--limit"),
-        (["--suite", "paper", "--kidnap"], "--kidnap"),
-        (["--suite", "paper", "--worlds", "house", "--out", "file/b.json"], "file/b.json"),
-        (["--suite", "paper", "--worlds", "house", "--report", "file/out"], "file/out"),
-        (["somewhere", "--suite", "paper"], "CASES"),
-        (["somewhere", "--suite", "scaling"], "CASES"),
-        (["--suite", "scaling", "--jobs", "2"], "--jobs"),
-        (["--suite", "scaling", "--runs", "2"], "--runs"),
-        (["--suite", "ablation"], "CASES"),
-        (["--suite", "ablation", "--seed", "2"], "--seed"),
-        (["--suite", "ablation", "nowhere"], "nowhere"),
-        (["--runs", "3"], "--runs"),
-        (["--track", "--runs", "3"], "--runs"),
-        (["--kidnap", "--suite", "paper"], "--kidnap"),
-    ],
-)
-def test_options_that_do_not_fit_are_refused(
-    cli, tmp_path: Path, options: list[str], word: str
-) -> None:
-    (tmp_path / "file").write_text("in the way")
-    ended = cli("bench", *options)
-    assert (ended.status, ended.out) == (2, "")
-    assert ended.err.startswith("firstfix: expected ")
-    assert ended.err.count("\n") == 1
-    assert word in ended.err

@@ -12,14 +12,6 @@ BRIDGE = ("--vda5050", "mqtt://127.0.0.1:1", "--manufacturer", "ACME", "--serial
 MAP_ID = ("--map-id", "house")
 
 
-def assert_one_line(ended: Any, *words: str) -> None:
-    assert (ended.status, ended.out) == (2, ""), ended
-    assert ended.err.startswith("firstfix: ")
-    assert ended.err.count("\n") == 1
-    for word in words:
-        assert word in ended.err
-
-
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -39,7 +31,7 @@ def assert_one_line(ended: Any, *words: str) -> None:
 def test_options_that_cannot_be_used(cli: Any, options: tuple[str, ...], words: tuple[str, ...]):
     pytest.importorskip("aiomqtt")
     ended = cli("serve", "house", "--port", 0, *options)
-    assert_one_line(ended, *words)
+    ended.assert_one_sentence(*words)
     assert "secret" not in ended.err
 
 
@@ -50,7 +42,7 @@ def test_a_version_that_is_none(cli: Any):
 def test_the_client_library_is_missing(cli: Any, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "aiomqtt", None)
     monkeypatch.delitem(sys.modules, "firstfix.vda5050.bridge", raising=False)
-    assert_one_line(cli("serve", "house", *BRIDGE, *MAP_ID), "aiomqtt", "firstfix[vda5050]")
+    cli("serve", "house", *BRIDGE, *MAP_ID).assert_one_sentence("aiomqtt", "firstfix[vda5050]")
 
 
 @pytest.mark.parametrize("command", ["ros1", "ros2", "dds"])
@@ -71,7 +63,7 @@ def test_nodes_have_the_same_options(cli: Any, command: str, monkeypatch: pytest
     assert len(ran) == 1
     if command != "dds":
         assert ran[0][0] == list(given)
-    assert_one_line(cli(command, *BRIDGE), "needs --map-id")
+    cli(command, *BRIDGE).assert_one_sentence("needs --map-id")
 
 
 def test_the_node_of_a_bridge_is_watched_and_takes_poses(ros2: Any):

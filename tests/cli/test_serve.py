@@ -111,18 +111,10 @@ def test_a_simulated_robot_in_a_site_is_served_with_the_name_of_its_map(tmp_path
         assert httpx.get(url + "v1/map").json()["name"] == "first"
 
 
-def assert_one_line(ended: Any, *words: str) -> None:
-    assert (ended.status, ended.out) == (2, ""), ended
-    assert ended.err.startswith("firstfix: ")
-    assert ended.err.count("\n") == 1
-    for word in words:
-        assert word in ended.err
-
-
 def test_a_port_that_is_taken(cli) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        assert_one_line(cli("serve", "house", "--port", port), f"{port}", "in use", "--port")
+        cli("serve", "house", "--port", port).assert_one_sentence(f"{port}", "in use", "--port")
         ended = cli("demo", "--world", "house", "--port", port)
         assert ended.status == 2
         assert f"{port}" in ended.err
@@ -143,12 +135,12 @@ def test_a_port_that_is_taken(cli) -> None:
     ],
 )
 def test_what_cannot_be_served(cli, arguments: tuple[str, ...], words: tuple[str, ...]) -> None:
-    assert_one_line(cli("serve", *arguments), *words)
+    cli("serve", *arguments).assert_one_sentence(*words)
 
 
 def test_a_map_that_is_not_there(cli) -> None:
     pytest.importorskip("cyclonedds")
-    assert_one_line(cli("serve", "no.yaml", "--robot", "dds"), "no.yaml")
+    cli("serve", "no.yaml", "--robot", "dds").assert_one_sentence("no.yaml")
 
 
 def test_arguments_of_ros_that_are_none(cli, unique: Files) -> None:
@@ -167,11 +159,11 @@ def test_options_that_are_none(cli) -> None:
 def test_a_robot_whose_ros_is_not_here(cli, unique: Files, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "rclpy", None)
     monkeypatch.delitem(sys.modules, "firstfix.ros.ros2.node", raising=False)
-    assert_one_line(cli("serve", unique[0], "--robot", "ros2"), "rclpy", "setup.bash")
+    cli("serve", unique[0], "--robot", "ros2").assert_one_sentence("rclpy", "setup.bash")
 
 
 def test_a_picture_of_the_demo_needs_headless(cli) -> None:
-    assert_one_line(cli("demo", "--plot", "a.png"), "--headless", "a.png")
+    cli("demo", "--plot", "a.png").assert_one_sentence("--headless", "a.png")
 
 
 def test_a_browser_is_opened_only_on_a_display(monkeypatch, capsys) -> None:

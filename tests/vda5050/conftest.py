@@ -19,6 +19,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "robots"))
 
+from action_desk import Desk
 from required import missing
 
 from firstfix.core.grid import OccupancyGrid
@@ -225,3 +226,11 @@ class Robot:
 def robot(hall_plan: OccupancyGrid) -> Robot:
     """Give a robot that has not received its map yet."""
     return Robot(hall_plan)
+
+
+@pytest.fixture
+def desk(robot: Robot) -> Desk:
+    """Give a robot with its map, at (3, 2, 0.5), that has not seen anything."""
+    made = Desk(robot)
+    robot.begin()
+    return made
