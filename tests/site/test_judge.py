@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.verdict import EXPONENT, log_likelihoods, place_probabilities
 from firstfix.site.judge import MAP_EXPONENT, are_one_place, judge_site
-from firstfix.site.look import PROMISING, Looked
+from firstfix.site.look import PROMISING, RECALL, Looked
 from firstfix.site.places import SiteCandidates, SitePlace
 from firstfix.site.query import SiteQuery
 from firstfix.site.surroundings import are_alike, show_the_same, surroundings
@@ -111,6 +112,22 @@ def test_what_the_first_look_may_have_missed_is_elsewhere() -> None:
     assert cut.hypotheses[0].probability == pytest.approx(0.9 * whole.hypotheses[0].probability)
     assert (whole.verdict, cut.verdict) == (Verdict.UNIQUE, Verdict.AMBIGUOUS)
     assert cut.elsewhere > 0.1
+
+
+def test_two_views_of_a_site_with_many_maps_can_decide() -> None:
+    # The recall of one look is below what several views need to be sure.
+    seen = tuple(f"map {i}" for i in range(PROMISING + 1))
+    ranges = QUERY.scans[0].ranges
+    scans = [LaserScan(ranges, -math.pi, 2 * math.pi / BEAMS, 0.1, 12.0, stamp=t) for t in (0, 1)]
+    query = SiteQuery.of(scans, [SE2(0, 0, 0), SE2(0.5, 0, 0)])
+    sure = replace(place(seen[0], 0.3), steps=(log_of(0.3), 2.0 * log_of(0.3)))
+    looked = Looked(seen, np.zeros(len(seen)), RECALL, PROMISING)
+    found = SiteCandidates((sure,), np.array(sure.steps), seen[:PROMISING])
+    result = judge_site(query, [looked], [found])
+    assert result.verdict is Verdict.UNIQUE, result.reason
+    assert 0.0 < result.elsewhere < 1.0 - RECALL
+    one = judge_site(QUERY, [looked], [replace(found, places=(place(seen[0], 0.3),))])
+    assert one.elsewhere >= 1.0 - RECALL
 
 
 def test_places_are_one_where_maps_are_copies_or_overlap() -> None:
