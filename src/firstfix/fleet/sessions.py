@@ -19,7 +19,7 @@ class Robot:
     Parameters
     ----------
     belief : SiteBelief
-        Where it may be; at most about 1 MB, and some kB once it is found.
+        Where it may be; at most 1 MB, and some 30 kB once it is found.
     answer : dict or None
         The last answer.
     seen : float

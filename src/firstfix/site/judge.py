@@ -47,8 +47,8 @@ SURE_PROBABILITY = BeliefConfig().sure_probability
 # errors, those of another do not. So no place is surer than in its map alone (0021).
 MAP_EXPONENT = 14.0
 
-# Looks at several views miss a map independently of each other; so many are counted (0022).
-LOOKS_APART = 2
+# Share of the maps that a look misses which the look at the next view misses, too (0026).
+MISSED_AGAIN = 0.5
 
 LISTED_PLACES = 24
 
@@ -94,7 +94,7 @@ def judge_site(
     if query.is_one_look:
         shares = seen.recall * _shares_of_look(places)[:, None]
     else:
-        recall = 1.0 - (1.0 - seen.recall) ** LOOKS_APART
+        recall = 1.0 - (1.0 - seen.recall) * MISSED_AGAIN
         shares = recall * _shares_of_views(places, copies, found)
     order = np.argsort(-shares[:, -1], kind="stable").tolist()
     places, copies, shares = [places[i] for i in order], [copies[i] for i in order], shares[order]

@@ -37,7 +37,7 @@ ENTERING = 8
 """Maps that may enter with each view, because a look at it alone finds them promising."""
 
 PLACES = 3000
-"""Places of all maps that are kept: 1 MB for each robot at most, and some kB once it is found."""
+"""Places of all maps that are kept: at most 1 MB for a robot, and some 30 kB once it is found."""
 
 # Less likely places are left out, as in the belief of one map.
 _NEGLIGIBLE_LOG = math.log(1e-6)
