@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import pytest
@@ -133,3 +134,35 @@ def test_a_slip_too_small_for_a_doubt_is_corrected_at_rest(in_hall, metres, of, 
     in_hall.pose = HERE @ SE2(metres, 0.0, math.radians(8.0))
     outputs = in_hall.ticks(30)
     assert is_at(of(TrackedPose, outputs)[-1].T_map_base, in_hall.pose, 0.1, 3.0)
+
+
+def test_a_corrected_slip_costs_nothing_of_what_is_known(in_hall, of):
+    in_hall.ticks(60, A_STEP)
+    known = len(in_hall.localizer.belief.window)
+    assert known >= 4
+    in_hall.pose = in_hall.pose @ SE2(0.2, 0.0, math.radians(8.0))
+    said = [status.reason for status in of(Status, in_hall.ticks(30))]
+    assert "corrected" in said
+    assert len(in_hall.localizer.belief.window) >= known
+
+
+def surrounded_by(count, more):
+    """Return a function that lets the first beams end at 0.6 m, with each scan more of them."""
+    ranges = {"shortened": 0}
+
+    def damage(scan):
+        ranges["shortened"] = min(count, ranges["shortened"] + more)
+        shorter = scan.ranges.copy()
+        shorter[: ranges["shortened"]] = 0.6
+        return dataclasses.replace(scan, ranges=shorter)
+
+    return damage
+
+
+@pytest.mark.parametrize(("more", "state"), [(6, State.LOCALIZED), (150, State.DISAMBIGUATING)])
+def test_a_pose_is_kept_if_only_the_surroundings_have_changed(in_hall, of, is_at, more, state):
+    in_hall.ticks(100, A_TURN)
+    outputs = in_hall.ticks(80, None, surrounded_by(150, more))
+    assert all(is_at(each.T_map_base, in_hall.pose, 0.3, 5.0) for each in of(TrackedPose, outputs))
+    said = [status.state for status in of(Status, outputs)]
+    assert (State.SEARCHING in said) is (state is not State.LOCALIZED)

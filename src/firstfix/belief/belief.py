@@ -14,16 +14,16 @@ from firstfix.belief.elsewhere import missed_log_odds, rival_cost, with_missed
 from firstfix.belief.enter import propose
 from firstfix.belief.evidence import shares
 from firstfix.belief.hints import Hint, Source, hint_logs, log_anywhere
-from firstfix.belief.joint import joint_log_likelihoods, power_of
+from firstfix.belief.joint import carried_at, joint_log_likelihoods, power_of
 from firstfix.belief.judge import Judgement, Rule, judge
 from firstfix.belief.merge import merge
-from firstfix.belief.misses import MOST_MISSES, count_misses
+from firstfix.belief.misses import count_misses, has_missed_enough
 from firstfix.belief.place import listed_places
 from firstfix.belief.planar import between, compose, in_cells, to_map
 from firstfix.belief.rejoin import rejoin
 from firstfix.belief.remember import remembered
 from firstfix.belief.tracks import Tracks, at_rest, follow, look_again, trace_back
-from firstfix.belief.view import Observation, View
+from firstfix.belief.view import Link, Observation, View
 from firstfix.belief.without_priors import is_hinted, share_without_programs, shares_by_views
 from firstfix.core.estimate import Hypothesis, SearchReport, Verdict
 from firstfix.core.se2 import SE2
@@ -80,6 +80,8 @@ class Belief:
         First id that no place has had.
     misses : int
         Views in a row that the best place does not explain though others do.
+    carried_at : int
+        The view of the window since which the robot is elsewhere; 0 if it has stayed.
     """
 
     fields: MapFields
@@ -95,6 +97,7 @@ class Belief:
     missed: float = 0.0
     next_id: int = 0
     misses: int = 0
+    carried_at: int = 0
 
     @property
     def verdict(self) -> Verdict:
@@ -293,6 +296,7 @@ def update(belief: Belief, view: View) -> Belief:
         missed=missed,
         next_id=belief.next_id + len(entering),
         misses=count_misses(belief.misses, judgement, tracks, entering, window[-1]),
+        carried_at=carried_at(tracks, probabilities, window),
     )
 
 
@@ -320,14 +324,17 @@ def _blind(belief: Belief, hits: int) -> Belief:
 def _followed(belief: Belief, view: View) -> tuple[tuple[Observation, ...], Tracks]:
     """Add a view to the window, and carry the tracks to it."""
     fields, window, tracks = belief.fields, belief.window, belief.tracks
-    seen = Observation((view,), fields.grid.resolution)
+    seen = Observation((view,), fields.grid.resolution, link=view.link)
     if not window:
         return (seen,), Tracks.none()
-    if rests(window[-1], view):
+    if view.link is not Link.BROKEN and rests(window[-1], view):
         joined = window[-1].joined_by(view)
         return (*window[:-1], joined), at_rest(tracks, joined, fields)
-    if belief.misses >= MOST_MISSES:
-        window, tracks = window[-1:], tracks.over([len(window) - 1])
+    forgotten = belief.carried_at
+    if has_missed_enough(belief.misses, window):
+        forgotten = len(window) - 1
+    if forgotten > 0:
+        window, tracks = window[forgotten:], tracks.over(slice(forgotten, None))
     elif len(window) >= belief.config.window:
         kept = remembered(window, belief.config)
         window, tracks = tuple(window[i] for i in kept), tracks.over(kept)

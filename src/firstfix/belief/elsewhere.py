@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from firstfix.belief.config import BeliefConfig
 from firstfix.belief.evidence import FLOOR, WRONG_MAP_COST, novelty
+from firstfix.belief.joint import last_break
 from firstfix.belief.tracks import Tracks
 from firstfix.belief.view import Observation
 from firstfix.global_localization.places import distinct_places
@@ -70,7 +71,7 @@ def missed_log_odds(tracks: Tracks, window: Sequence[Observation], config: Belie
     gains = _NEW_VIEW + _GAIN_EXPONENT * np.maximum(gains, _LEAST_GAIN)
     gains *= novelty(window)
     # A robot that was carried has been elsewhere: older views do not count against its new place.
-    older = max(0, len(window) - config.window)
+    older = max(0, len(window) - config.window, last_break(window))
     evidence = max(0.0, float(gains[:older].sum())) + float(gains[older:].sum())
     return math.log(_EVEN_M2 / max(1.0, window[-1].covered_m2)) - evidence
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
 
 import numpy as np
@@ -33,6 +34,14 @@ _SAME_MOUNT_M = 0.01
 _SAME_MOUNT_RAD = math.radians(0.5)
 
 
+class Link(Enum):
+    """How a view goes on from the one before."""
+
+    UNKNOWN = "unknown"
+    GOES_ON = "goes on"
+    BROKEN = "broken"
+
+
 @dataclass(frozen=True, eq=False)
 class View:
     """The scans of one time and the odometry at that time.
@@ -43,6 +52,8 @@ class View:
         One scan of each sensor; at least one.
     T_odom_base : SE2
         Pose of the base in the odometry frame.
+    link : Link
+        Whether all scans since the view before go on from each other: `link.link`.
 
     Raises
     ------
@@ -52,6 +63,7 @@ class View:
 
     scans: tuple[LaserScan, ...]
     T_odom_base: SE2
+    link: Link = Link.UNKNOWN
 
     def __post_init__(self) -> None:
         if not self.scans:
@@ -94,11 +106,14 @@ class Observation:
     rival_cost : float
         Mean cost of a beam, nats, at the third best place of the view's own search; infinite before
         that, or if there is none.
+    link : Link
+        Of the first of the views.
     """
 
     views: tuple[View, ...]
     resolution: float
     rival_cost: float = math.inf
+    link: Link = Link.UNKNOWN
 
     @cached_property
     def scans(self) -> tuple[LaserScan, ...]:
@@ -146,7 +161,8 @@ class Observation:
 
     def joined_by(self, view: View) -> Observation:
         """Add a view from the same place."""
-        return Observation((*self.views, view)[-MOST_AT_REST:], self.resolution)
+        views = (*self.views, view)[-MOST_AT_REST:]
+        return Observation(views, self.resolution, link=self.link)
 
     def same_sensors(self, view: View) -> bool:
         """Tell whether a view comes from the same sensors, beam by beam."""

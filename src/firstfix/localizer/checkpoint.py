@@ -14,7 +14,7 @@ import numpy as np
 
 from firstfix.amcl.tracker import Track
 from firstfix.belief.belief import Belief
-from firstfix.belief.view import View
+from firstfix.belief.view import Link, View
 from firstfix.core.errors import InputError
 from firstfix.core.estimate import Hypothesis
 from firstfix.core.odometry import Odometry, SignalKind
@@ -71,6 +71,7 @@ _PARTS: Mapping[type[Any], Mapping[str, Any]] = {
         "_agreement": AgreementCounter,
         "_searched_at": float | None,
         "_usual_cost": float,
+        "_last_cost": float | None,
     },
     AgreementCounter: {"_T_map_odom": SE2 | None, "_count": int},
     PlaceBelief: {
@@ -80,6 +81,9 @@ _PARTS: Mapping[type[Any], Mapping[str, Any]] = {
         "_views_against": int,
         "_views_lost": int,
         "_fixes": dict[str, Prior],
+        "_before": View | None,
+        "_link": Link,
+        "_stays": bool,
         "belief": Belief,
     },
 }

@@ -88,6 +88,7 @@ class MapLocalization:
 
     def use(self, view: View) -> list[Output]:
         """Use a view of a robot on the floor: what it means depends on the state."""
+        self.places.watch(view)
         steps = {
             State.SEARCHING: self._find,
             State.DISAMBIGUATING: self._find,
@@ -211,15 +212,20 @@ class MapLocalization:
         tracked = self.tracker.follow(view, force_update=self._update_requested)
         self._update_requested = False
         place, fit = tracked.judgement.place, tracked.judgement.fit
+        if tracked.judgement.has_jumped:
+            self.places.suspect_kidnap()
         if fit is Fit.ELSEWHERE:
             away = place.pose.distance_to(tracked.pose.T_map_base)
             if not is_same_place(place.pose, tracked.pose.T_map_base):
                 reason = f"found {away:.1f} m from the tracked pose"
                 return self._arrive(view, place, Event.RELOCALIZED, reason)
             corrected = self.tracker.start(view.stamp, view.T_odom_base, place)
-            self.places.restart()  # the wheels slipped: earlier views are not where they seem
+            if not self.places.prefers(place.pose):
+                self.places.restart()  # the wheels slipped: earlier views are not where they seem
             return [corrected, self.status(view.stamp, "corrected", place.evidence)]
         if fit is Fit.CONTRADICTED:
+            if held := self._hold(view, tracked):
+                return held
             explained = place.evidence.explained
             reason = f"only {explained:.0%} of the beams fit here, for too long: searching"
             return [self.restart(view.stamp, Event.CONTRADICTED, reason, place.evidence)]
@@ -236,6 +242,17 @@ class MapLocalization:
             self._count_changes(view, tracked)
         reason = self._unless_chosen(tracked.fit_in_words)
         return [tracked.pose, self.status(view.stamp, reason, place.evidence)]
+
+    def _hold(self, view: View, tracked: Tracked) -> list[Output]:
+        """Go on where the belief puts the robot, if not it has changed but what is around it."""
+        if self._chosen_by is not None or not self._weigh(view, Pace.EVERY_SCAN):
+            return []
+        if not self.places.still_holds(tracked.pose.T_map_base):
+            return []
+        best = self.places.places[0]
+        pose = self.tracker.start(view.stamp, view.T_odom_base, best)
+        reason = f"only {best.evidence.explained:.0%} of the beams fit, but the views before do"
+        return [pose, self.status(view.stamp, reason, best.evidence)]
 
     def _is_settled(self, tracked: Tracked) -> bool:
         return self._chosen_by is None and tracked.judgement.fit is Fit.CONSISTENT

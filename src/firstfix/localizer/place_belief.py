@@ -20,8 +20,9 @@ from firstfix.belief.belief import (
 )
 from firstfix.belief.config import BeliefConfig
 from firstfix.belief.hints import Source
-from firstfix.belief.judge import MOST_MISSED
-from firstfix.belief.view import View
+from firstfix.belief.judge import MOST_MISSED, STAYING_PROBABILITY
+from firstfix.belief.link import link
+from firstfix.belief.view import Link, View
 from firstfix.core.estimate import Hypothesis, Verdict
 from firstfix.core.scan import Scans, as_scans
 from firstfix.core.se2 import SE2
@@ -93,6 +94,9 @@ class PlaceBelief:
         self._views_against = 0
         self._views_lost = 0  # in a row that neither the belief nor the monitor puts there
         self._fixes: dict[str, Prior] = {}  # by their source
+        self._before: View | None = None
+        self._link = Link.UNKNOWN  # of all scans since the latest view of the belief
+        self._stays = False  # nearly all of the newest scan goes on from the one before
         self.belief = begin(fields, None, config)
 
     @property
@@ -177,6 +181,25 @@ class PlaceBelief:
         self.belief = with_prior(replace(self.belief, hints=kept), prior, T_odom_base)
         self._fixes[source] = prior
 
+    def watch(self, view: View) -> None:
+        """Compare each view with the one before: the robot may have been carried."""
+        now, self._stays = Link.UNKNOWN, False
+        if self._before is not None:
+            now, self._stays = link(self._before, view)
+        self._before = view
+        if now is Link.BROKEN:
+            self._break_off()
+        elif now is Link.UNKNOWN and self._link is Link.GOES_ON:
+            self._link = now
+
+    def suspect_kidnap(self) -> None:
+        """Take it that the robot may have been carried, unless the newest scan denies it."""
+        if not self._stays:
+            self._break_off()
+
+    def _break_off(self) -> None:
+        self._credit, self._link = 0, Link.BROKEN
+
     def update(self, scans: Scans, T_odom_base: SE2, pace: Pace) -> bool:
         """Predict, and weigh all places by a scan if one is due.
 
@@ -194,7 +217,7 @@ class PlaceBelief:
         bool
             True if the scan was used.
         """
-        view = View(as_scans(scans), T_odom_base)
+        view = View(as_scans(scans), T_odom_base, self._link)
         moved = self._has_moved(T_odom_base, REST_M, REST_RAD)
         if not self._is_due(view.stamp, T_odom_base, pace):
             self.belief = predict(self.belief, T_odom_base)
@@ -203,7 +226,9 @@ class PlaceBelief:
         self.belief = update(self.belief, view)
         listed = self.belief.places
         self._places = listed if moved else _in_order_of(self._places, listed)
-        return self.is_blind or _hits(view) >= FEWEST_HITS
+        is_used = _hits(view) >= FEWEST_HITS
+        self._link = Link.GOES_ON if is_used else self._link
+        return self.is_blind or is_used
 
     def pose_was_published(self) -> None:
         """Watch closely at first: the pose may be wrong."""
@@ -219,6 +244,23 @@ class PlaceBelief:
         """How often to weigh all places while a pose is tracked."""
         is_settled = self._credit >= _CONFIRMING_VIEWS and self._views_against == 0
         return Pace.BACKGROUND if is_settled else Pace.EVERY_VIEW
+
+    def still_holds(self, T_map_base: SE2) -> bool:
+        """Tell whether the robot must be here, though its newest scans do not fit.
+
+        True if it has not been carried for as many views as are judged together, and if all of them
+        speak for this place.
+        """
+        latest = self.belief.window[-self._config.window :]
+        goes_on = all(seen.link is Link.GOES_ON for seen in latest)
+        return len(latest) == self._config.window and goes_on and self.prefers(T_map_base)
+
+    def prefers(self, T_map_base: SE2) -> bool:
+        """Tell whether this is more likely than all other places together, by odometry."""
+        belief = self.belief
+        if len(belief.poses) == 0 or belief.probabilities[0] < STAYING_PROBABILITY:
+            return False
+        return is_same_place(SE2.from_array(belief.poses[0]), T_map_base)
 
     def support_for(self, T_map_base: SE2, fit: Fit) -> Support:
         """Compare a published pose with the belief; call it once after each update.

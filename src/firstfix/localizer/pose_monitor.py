@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -68,11 +68,14 @@ class Judgement:
         The tracked place; with ELSEWHERE the place where the robot really is.
     is_sudden : bool
         True if the scans before fitted much better.
+    has_jumped : bool
+        True if the very scan before did.
     """
 
     fit: Fit
     place: Hypothesis
     is_sudden: bool = False
+    has_jumped: bool = False
 
 
 class PoseMonitor:
@@ -96,6 +99,7 @@ class PoseMonitor:
         self._agreement = AgreementCounter()
         self._searched_at: float | None = None
         self._usual_cost = _GOOD_COST
+        self._last_cost: float | None = None
 
     def judge(
         self,
@@ -126,6 +130,19 @@ class PoseMonitor:
         """
         scans = as_scans(scans)
         (tracked,) = self._matcher.score_poses(scans, [T_map_base])
+        before, self._last_cost = self._last_cost, tracked.score
+        judgement = self._judge(scans, tracked, T_odom_base, T_map_base, covariance)
+        has_jumped = before is not None and tracked.score - before > _SUDDEN_COST
+        return replace(judgement, has_jumped=has_jumped)
+
+    def _judge(
+        self,
+        scans: tuple[LaserScan, ...],
+        tracked: Hypothesis,
+        T_odom_base: SE2,
+        T_map_base: SE2,
+        covariance: NDArray[np.float64] | None,
+    ) -> Judgement:
         if np.count_nonzero(joint_beams(scans)[1].hit) < FEWEST_HITS:
             return Judgement(Fit.UNINFORMATIVE, tracked)
         stamp = max(scan.stamp for scan in scans)

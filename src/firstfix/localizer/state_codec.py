@@ -27,7 +27,7 @@ from firstfix.belief.belief import Belief
 from firstfix.belief.config import BeliefConfig
 from firstfix.belief.prior import All, AnyOf, Gaussian, Near, Region
 from firstfix.belief.tracks import Tracks
-from firstfix.belief.view import Observation, View
+from firstfix.belief.view import Link, Observation, View
 from firstfix.core.errors import InputError
 from firstfix.core.estimate import Evidence, Hypothesis, SearchReport, Verdict
 from firstfix.core.odometry import Odometry, Signal, SignalKind
@@ -79,7 +79,7 @@ _ENUMS = {
     each.__name__: each
     for each in (
         *(State, Verdict, SignalKind, Mounting, Method, MotionModel, SensorModel),
-        *(hints.Source, pose_monitor.Fit),
+        *(hints.Source, pose_monitor.Fit, Link),
     )
 }
 _DTYPES = ("<f8", "<f4", "<i8", "<i4", "|b1", "|i1", "|u1")
