@@ -36,6 +36,18 @@ def test_steps_are_left_out_over_cases(cli, cases: Path, tmp_path: Path) -> None
 
 
 @pytest.mark.slow
+def test_the_law_is_chosen_without_each_building(cli, cases: Path, tmp_path: Path) -> None:
+    arguments = [cases / "unique", "--floors", "7-8", "--limit", 2, "--out", "c.json"]
+    ended = cli("bench", "--suite", "calibration", *arguments, "--report", "out")
+    assert ended.status == 0, ended
+    assert "| recorded | chosen without it " in ended.out
+    document = json.loads((tmp_path / "c.json").read_text())
+    assert {row["building"] for row in document["rows"]} == {"hall", "floor_00007", "floor_00008"}
+    assert {(row["scans"], row["wrong_map_scans"]) for row in document["rows"]} == {(2, 2)}
+    assert (tmp_path / "out" / "report.md").exists()
+
+
+@pytest.mark.slow
 def test_costs_of_one_office_are_measured(
     cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -36,6 +36,7 @@ class Suite(Enum):
     PAPER = "paper"
     SCALING = "scaling"
     ABLATION = "ablation"
+    CALIBRATION = "calibration"
 
 
 class Printed(Enum):
@@ -58,6 +59,7 @@ _OPTIONS = {
     "--suite paper": {"--worlds", "--runs", "--seed", "--jobs", "--report"},
     "--suite scaling": {"--seed", "--report"},
     "--suite ablation": {*_CASES, "--limit", "--jobs", "--report"},
+    "--suite calibration": {*_CASES, "--limit", "--jobs", "--report"},
 }
 _WITHOUT_CASES = {"--kidnap", "--rides", "--suite paper", "--suite scaling"}
 
@@ -227,7 +229,7 @@ def bench(
         typer.Option(
             help="paper: ways of starting in built-in buildings. scaling: time and memory against "
             "area, beams and threads. ablation: CASES with each step of the default method left "
-            "out.",
+            "out. calibration: the law of one scan, chosen without each building and judged there.",
             show_default=False,
             rich_help_panel=SUITES,
         ),
@@ -315,6 +317,8 @@ def bench(
         benchmark = benchmarks.scaling_benchmark(first_seed)
     elif measure == "--suite ablation":
         benchmark = benchmarks.ablation_benchmark(found, limit)
+    elif measure == "--suite calibration":
+        benchmark = benchmarks.calibration_benchmark(found, limit)
     else:
         methods = _methods(method or [], estimates or [], on_wrong_maps=wrong_map)
         benchmark = benchmarks.locate_benchmark(found, methods, limit, with_wrong_maps=wrong_map)

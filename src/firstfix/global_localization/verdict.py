@@ -18,7 +18,7 @@ from firstfix.global_localization.beams import Beams
 # docs/decisions/0005 has the measurements.
 EXPONENT = 12.0
 _BEAMS_FOR_EXPONENT = 30
-_FLOOR = 0.2
+FLOOR = 0.2
 
 # An answer with fewer beams explained comes with a warning.
 _DOUBTFUL_FIT = 0.6
@@ -88,7 +88,7 @@ def with_prior(
     exponent : float
         Of `exponent_of`.
     """
-    costs: NDArray[np.float64] = (scores + _FLOOR) * np.exp(-logs / exponent) - _FLOOR
+    costs: NDArray[np.float64] = (scores + FLOOR) * np.exp(-logs / exponent) - FLOOR
     return costs
 
 
@@ -107,7 +107,7 @@ def log_likelihoods(scores: NDArray[np.float64], exponent: float) -> NDArray[np.
     ndarray, shape (n,)
         Natural logarithms.
     """
-    logs: NDArray[np.float64] = -exponent * np.log(scores + _FLOOR)
+    logs: NDArray[np.float64] = -exponent * np.log(scores + FLOOR)
     return logs
 
 

@@ -12,6 +12,12 @@ from firstfix.core.errors import InputError
 from firstfix.lab.experiments.ablation import AblationTask, ablation_document, ablation_table
 from firstfix.lab.experiments.bench_method import BenchMethod
 from firstfix.lab.experiments.benchmark import Benchmark, Summary
+from firstfix.lab.experiments.calibration import (
+    FEWEST_BUILDINGS,
+    calibration_document,
+    calibration_tables,
+    calibration_tasks,
+)
 from firstfix.lab.experiments.case import Case, SensorCut
 from firstfix.lab.experiments.kidnap_bench import KidnapCaseTask, KidnapResult, KidnapWorldTask
 from firstfix.lab.experiments.locate_bench import (
@@ -52,7 +58,11 @@ from firstfix.lab.reports.paper_report import (
     worlds_table,
     write_paper_report,
 )
-from firstfix.lab.reports.suite_reports import write_ablation_report, write_scaling_report
+from firstfix.lab.reports.suite_reports import (
+    write_ablation_report,
+    write_calibration_report,
+    write_scaling_report,
+)
 
 # Scenarios that share a process: few enough to show progress, enough to pay for its start.
 _KIDNAPS_A_TASK = 5
@@ -277,6 +287,24 @@ def ablation_benchmark(cases: Sequence[Case], limit: int) -> Benchmark:
 
     tasks = [AblationTask(case, limit) for case in cases]
     return Benchmark(tasks, [case.name for case in cases], summarize)
+
+
+def calibration_benchmark(cases: Sequence[Case], limit: int) -> Benchmark:
+    """Choose the law of one scan without each building, and judge it there."""
+    tasks = calibration_tasks(cases, limit)
+    if len({task.case.site for task in tasks}) < FEWEST_BUILDINGS:
+        raise InputError(
+            expected=f"cases of {FEWEST_BUILDINGS} buildings: one is left out, the others choose",
+            received=f"{len({case.site for case in cases})}",
+            remedy="name more cases, or random floors with --floors",
+        )
+
+    def summarize(results: list[Any]) -> Summary:
+        document = calibration_document(results)
+        report = partial(write_calibration_report, document)
+        return Summary(document, calibration_tables(document)[:1], (), report)
+
+    return Benchmark(tasks, [task.case.name for task in tasks], summarize)
 
 
 def cut_to_sensors(cases: Sequence[Case], sensors: Sequence[SensorCut | None]) -> list[Case]:
