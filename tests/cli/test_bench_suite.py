@@ -51,6 +51,7 @@ def test_the_law_is_chosen_without_each_building(cli, cases: Path, tmp_path: Pat
 def test_costs_of_one_office_are_measured(
     cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("firstfix.lab.experiments.scaling._SCANS", 2)
     one_office = partial(scaling_tasks, offices=(1,), beams=(100,))
     monkeypatch.setattr("firstfix.lab.benchmarks.scaling_tasks", one_office)
     ended = cli("bench", "--suite", "scaling", "--out", "s.json", "--report", "out")

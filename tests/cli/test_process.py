@@ -52,7 +52,7 @@ def test_a_reader_that_leaves_early_is_no_error(unique: Files) -> None:
     process.stdout.close()
     errors = process.stderr.read()
     process.stderr.close()
-    process.wait(timeout=60)
+    process.wait(timeout=240)
     assert errors == b""
 
 

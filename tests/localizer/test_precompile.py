@@ -105,14 +105,8 @@ def test_what_is_compiled_is_not_compiled_again(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("sensor", "motion"),
-    [
-        *((sensor, MotionModel.DIFFERENTIAL) for sensor in SensorModel),
-        (SensorModel.LIKELIHOOD_FIELD, MotionModel.OMNIDIRECTIONAL),
-        (SensorModel.LIKELIHOOD_FIELD, MotionModel.STATIONARY),
-    ],
-)
+# Each of both once.
+@pytest.mark.parametrize(("sensor", "motion"), [*zip(SensorModel, MotionModel, strict=True)])
 def test_the_first_scans_of_a_robot_compile_nothing(sensor, motion):
     ended = subprocess.run(
         [sys.executable, "-c", STORY, sensor.value, motion.value],

@@ -43,7 +43,7 @@ class FleetServer:
         if not found:
             self.process.stdout.close()
             raise AssertionError(f"the service ended with {self.process.wait(20.0)}: {line}")
-        self.http = httpx.Client(base_url=found.group(), timeout=60.0)
+        self.http = httpx.Client(base_url=found.group(), timeout=240.0)
 
     def wait_until_ready(self) -> FleetServer:
         until = time.monotonic() + READY_S

@@ -16,7 +16,7 @@ import subprocess
 import sys
 import time
 import xmlrpc.client
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +26,9 @@ from firstfix.core.se2 import SE2
 HERE = Path(__file__).parent
 # Debian's tools run on Debian's Python.
 PATH = os.pathsep.join(["/usr/bin", os.environ.get("PATH", "")])
-TOOLS = ("roscore", "roslaunch", "rosbag")
+TOOLS = ("roscore", "rosmaster", "roslaunch", "rosbag")
+# A master alone takes a quarter of the time of one with all that belongs to it.
+MASTER, WITH_ROSOUT = ("rosmaster", "--core"), ("roscore",)
 # In a fresh checkout, kernels are compiled first, by several processes at a time.
 PATIENCE_S = 240.0
 _POLL_S = 0.05
@@ -132,7 +134,7 @@ class Program:
 
 
 class Master:
-    """A roscore, at an address of its own."""
+    """A master, at an address of its own."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -149,10 +151,12 @@ class Master:
             "PYTHONUNBUFFERED": "1",
         }
 
-    def start(self) -> None:
+    def start(self, program: Sequence[str] = MASTER) -> None:
         """Start it, without waiting: nodes wait for it."""
-        command = [str(shutil.which("roscore", path=PATH)), "-p", self._uri.rpartition(":")[2]]
-        log = self._folder / f"roscore-{next(self._starts)}.log"
+        tool, *options = program
+        path = str(shutil.which(tool, path=PATH))
+        command = [path, *options, "-p", self._uri.rpartition(":")[2]]
+        log = self._folder / f"master-{next(self._starts)}.log"
         self._program = Program(command, self.environment, log)
 
     def end(self) -> None:
@@ -183,7 +187,7 @@ class Master:
         return next((nodes for name, nodes in published if name == topic), [])
 
     def _ask(self, call: str, *arguments: Any) -> Any:
-        return wait_until(lambda: self._answer(call, *arguments), lambda: "no roscore")[0]
+        return wait_until(lambda: self._answer(call, *arguments), lambda: "no master")[0]
 
     def _answer(self, call: str, *arguments: Any) -> list[Any]:
         """Return the answer, alone in a list; nothing while there is no master."""

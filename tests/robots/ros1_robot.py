@@ -135,7 +135,7 @@ class Robot:
         if "go" in command:
             TOLD.set()
         if "ask" in command:
-            rospy.wait_for_service(command["ask"], timeout=10.0)
+            rospy.wait_for_service(command["ask"], timeout=240.0)
             rospy.ServiceProxy(command["ask"], Empty)()
         if "load" in command:
             load = rospy.ServiceProxy("firstfix/load_map", nav_msgs.srv.LoadMap)

@@ -29,7 +29,7 @@ ALL = ("bond", "nav2_msgs", "kobuki_ros_interfaces", "visualization_msgs")
 # The wheels never turn: a change of the pose means that the robot is carried.
 T_ODOM_BASE = SE2(5.0, 5.0, 1.0)
 # A kernel may have to be compiled first.
-PATIENCE_S = 120.0
+PATIENCE_S = 240.0
 
 
 class Lab:

@@ -9,7 +9,7 @@ from functools import partial
 from websockets.sync.client import ClientConnection
 from websockets.sync.client import connect as connect_sync
 
-PATIENCE_S = 30.0
+PATIENCE_S = 240.0
 
 # A client that stops reading does not receive the answer to its close frame.
 connect = partial(connect_sync, max_queue=None, close_timeout=2.0)

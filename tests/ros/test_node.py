@@ -172,12 +172,12 @@ def test_stopping_has_a_time_limit(run, robot, recorder, monkeypatch):
 
     def observe(given, outputs, localizer):
         begun.set()
-        go_on.wait(60.0)
+        go_on.wait(240.0)
 
     node = Node(NodeConfig(), recorder, [observe])
     node.start()
     node.receive(Channel.MAP, robot.map())
-    assert begun.wait(60.0)
+    assert begun.wait(240.0)
     node.stop()
     assert node._worker.is_alive()
     go_on.set()

@@ -127,7 +127,7 @@ def test_a_slow_disk_delays_no_scan(memory_of, hall_plan, monkeypatch):
 
     def save(keeper, pose):
         begun.set()
-        go_on.wait(60.0)
+        go_on.wait(240.0)
         written.append(pose.stamp)
 
     monkeypatch.setattr(PoseKeeper, "save", save)
@@ -135,7 +135,7 @@ def test_a_slow_disk_delays_no_scan(memory_of, hall_plan, monkeypatch):
     memory.hint_after(NewMap(0.0, hall_plan))
     for i in range(100):
         memory.keep(localized(10.0 + i))
-    assert begun.wait(60.0)
+    assert begun.wait(240.0)
     go_on.set()
     memory.close()
     assert written == [11.0, 109.0]  # none of those between has queued up
@@ -310,7 +310,7 @@ class Life:
         self._robot.move()
         self._looked.clear()
         self._robot.report(self._node.receive)
-        assert self._looked.wait(60.0)
+        assert self._looked.wait(240.0)
 
     def receive(self, received, message=None):
         self._node.receive(received, message)

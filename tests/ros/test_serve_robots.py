@@ -39,7 +39,7 @@ def url_in(log: Callable[[], str]) -> str:
 
 def localize_three_times(url: str) -> None:
     """Localize, then again after a hint and after a reset."""
-    with httpx.Client(base_url=url, timeout=60.0) as api:
+    with httpx.Client(base_url=url, timeout=240.0) as api:
 
         def status() -> dict[str, Any]:
             return api.get("/v1/status").json()

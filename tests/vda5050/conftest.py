@@ -31,7 +31,7 @@ from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.outputs import Output
 
 HERE = SE2(3.0, 2.0, 0.5)
-PATIENCE_S = 60.0
+PATIENCE_S = 240.0
 
 
 def until(holds: Callable[[], Any], what: str) -> Any:

@@ -51,7 +51,7 @@ def test_a_simulated_robot_in_a_fleet(broker: Any, listen: Callable[..., Any]):
         until(lambda: fleet.of("visualization"), "a pose")
     finally:
         process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=60.0)
+        _, err = process.communicate(timeout=240.0)
     assert process.returncode == 130  # interrupted
     assert err == f"VDA 5050: connected to {broker.url}\n"
     until(lambda: fleet.of("connection")[-1]["connectionState"] == "OFFLINE", "the end")

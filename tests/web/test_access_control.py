@@ -36,7 +36,7 @@ def locked():
 def raw(site: Site, method: str, path: str, headers: dict[str, str]) -> tuple[int, dict, bytes]:
     """Request a path as it is written; HTTP libraries would normalize it."""
     address = urlsplit(site.url)
-    connection = http.client.HTTPConnection(address.hostname, address.port, timeout=30)
+    connection = http.client.HTTPConnection(address.hostname, address.port, timeout=240)
     connection.putrequest(method, path, skip_host="Host" in headers)
     for name, value in headers.items():
         connection.putheader(name, value)

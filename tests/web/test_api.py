@@ -33,7 +33,7 @@ def site() -> Iterator[Site]:
 @pytest.fixture
 def api(site: Site) -> Iterator[httpx.Client]:
     site.given.clear()
-    with httpx.Client(base_url=site.url, timeout=60.0) as client:
+    with httpx.Client(base_url=site.url, timeout=240.0) as client:
         yield client
 
 
@@ -164,7 +164,7 @@ def test_bodies_that_become_too_long_are_refused(site):
             yield b" " * 65536
 
     try:
-        answer = httpx.post(site.url + "v1/locate", content=endless(), headers=JSON, timeout=60.0)
+        answer = httpx.post(site.url + "v1/locate", content=endless(), headers=JSON, timeout=240.0)
     except (httpx.WriteError, httpx.ReadError):
         return  # the server closed the connection before the body was sent
     assert detail(answer, 413)

@@ -33,7 +33,7 @@ def ways(recorder: Recorder, request: pytest.FixtureRequest):
     with (
         listen("127.0.0.1", 0) as listening,
         BackgroundPage("dds", name, AccessPolicy(), listening) as page,
-        httpx.Client(base_url=url_of(listening), timeout=30.0) as api,
+        httpx.Client(base_url=url_of(listening), timeout=240.0) as api,
     ):
         until(lambda: page._server.started)
         yield page, api

@@ -49,7 +49,7 @@ def site(hall_plan: OccupancyGrid) -> Iterator[Site]:
 
 @pytest.fixture
 def api(site: Site) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=site.url, timeout=60.0) as client:
+    with httpx.Client(base_url=site.url, timeout=240.0) as client:
         yield client
 
 

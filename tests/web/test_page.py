@@ -22,7 +22,6 @@ from firstfix.lab.worlds.catalog import WORLDS
 pytestmark = pytest.mark.slow
 
 DEVICES = pytest.mark.parametrize("device", [DESKTOP, PHONE], ids=["desktop", "phone"])
-SCHEMES = pytest.mark.parametrize("scheme", ["light", "dark"])
 
 # Of light.css, as the canvas shows them.
 WALL, FREE = (0x27, 0x31, 0x3D, 255), (0xFB, 0xFC, 0xFD, 255)
@@ -31,8 +30,10 @@ Visitor = Callable[..., Visit]
 Turned = tuple[OccupancyGrid, Server]
 
 
-@DEVICES
-@SCHEMES
+# Of device and scheme each once.
+@pytest.mark.parametrize(
+    ("device", "scheme"), [(DESKTOP, "light"), (PHONE, "dark")], ids=["desktop-light", "phone-dark"]
+)
 def test_the_robot_appears(
     visit: Visitor, office_server: Server, device: dict, scheme: str, tmp_path: Path
 ) -> None:
@@ -103,7 +104,7 @@ def turned(chromium: Any, request: pytest.FixtureRequest, tmp_path: Path) -> Ite
 
 
 # The last is wider than a picture may be: some cells share a pixel, and an odd one is left.
-@pytest.mark.parametrize("turned", [(0.0, 0), (0.6, 0), (-2.0, 0), (0.3, 4321)], indirect=True)
+@pytest.mark.parametrize("turned", [(-2.0, 0), (0.3, 4321)], indirect=True)
 def test_a_turned_map_lies_at_its_origin(turned: Turned, visit: Visitor) -> None:
     grid, server = turned
     page = visit(server.url, color_scheme="light")
@@ -132,11 +133,11 @@ def test_a_scene_is_drawn_only_when_it_changes(visit: Visitor, office_server: Se
         ctx.clearRect = (...area) => { frames += 1; clear.apply(ctx, area); };
         setTimeout(() => { delete ctx.clearRect; done(frames); }, 1000);
     })"""
-    page.page.wait_for_timeout(300)
-    assert page.page.evaluate(count) == 0
+    # A last message may still be on its way.
+    wait_until(lambda: page.page.evaluate(count) == 0, lambda: "it is drawn again and again")
     page.page.click("#pause")
     page.page.wait_for_selector("#paused", state="hidden")
-    assert page.page.evaluate(count) > 5
+    wait_until(lambda: page.page.evaluate(count) > 5, lambda: "it stays as it was drawn")
 
 
 def test_the_theme_follows_the_system_until_the_button_is_pressed(

@@ -42,7 +42,7 @@ def test_the_page_reconnects_to_a_restarted_server(visit: Visitor, chromium: Any
     page.page.wait_for_selector("#error-notice", state="visible")
     server.start()
     try:
-        page.page.wait_for_selector("#connection-lost", state="hidden", timeout=60_000)
+        page.page.wait_for_selector("#connection-lost", state="hidden")
         page.wait_for_state("LOCALIZED")
         assert page.data("connected") == "true"
         assert page.page.is_hidden("#last-known")

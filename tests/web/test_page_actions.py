@@ -189,7 +189,7 @@ def test_the_belief_is_a_heat_layer(visit: Visitor, rooms_server: Server) -> Non
     for layer in ("scan", "truth"):
         page.page.click(f"[data-layer={layer}]")
     page.look_at(*place, 400.0)
-    page.page.wait_for_timeout(300)
+    page.wait_for_frames()
     # The robot drives, and the places are older than the belief by up to one view: the mass may
     # lie in the next cell.
     shifts = 0.25 * np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
@@ -214,10 +214,10 @@ def test_the_belief_is_a_heat_layer(visit: Visitor, rooms_server: Server) -> Non
         lambda: f"{[colours(cell) for cell in cells]}",
     )
     page.page.click("[data-layer=belief]")
-    page.page.wait_for_timeout(300)
-    hidden = colours(points)
+    wait_until(
+        lambda: set(colours(points)) == {(0, 0, 0, 0)}, lambda: f"{colours(points)} is shown"
+    )
     page.page.click("#pause")
-    assert set(hidden) == {(0, 0, 0, 0)}
 
 
 def test_a_carried_robot_is_lifted_and_localized_again(page: Visit) -> None:
@@ -244,7 +244,6 @@ def test_a_goal_is_driven_to(page: Visit) -> None:
     wait_until(
         lambda: math.dist(page.pose("truth")[:2], (goal.x, goal.y)) < 0.3,
         lambda: f"at {page.pose('truth')}, not {goal}",
-        90.0,
     )
     assert page.data("mode") == "goal"  # the next click is the next goal
     page.page.keyboard.press("Escape")
@@ -303,11 +302,13 @@ def test_layers_can_be_hidden(visit: Visitor, office_server: Server, device: dic
     for chip in page.page.locator("[data-layer]:visible").all():
         chip.click()
         assert chip.get_attribute("aria-pressed") == "false"
-    page.page.wait_for_timeout(200)
-    # Nothing but the robot, its heading, and the canvas itself.
-    x, y, yaw = page.pose()
-    behind = page.colour("overlay", x - 3.0 * math.cos(yaw), y - 3.0 * math.sin(yaw))
-    assert behind == (0, 0, 0, 0)
+
+    def behind() -> tuple[int, ...]:
+        """Nothing but the robot, its heading, and the canvas itself."""
+        x, y, yaw = page.pose()
+        return page.colour("overlay", x - 3.0 * math.cos(yaw), y - 3.0 * math.sin(yaw))
+
+    wait_until(lambda: behind() == (0, 0, 0, 0), lambda: f"{behind()} is drawn")
 
 
 def test_a_kidnapped_robot_is_found_without_a_signal(page: Visit) -> None:

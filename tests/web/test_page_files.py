@@ -78,7 +78,7 @@ def test_what_is_missing_or_wrong_is_said_in_plain_words(
     broken = tmp_path / "broken.npz"
     broken.write_bytes(b"PK\x03\x04 and nothing else")
     choose.set_input_files([str(broken), str(image)])
-    page.page.wait_for_selector("#error-notice", state="visible", timeout=60_000)
+    page.page.wait_for_selector("#error-notice", state="visible")
     assert "broken.npz" in page.page.inner_text("#error-notice")
     assert page.page.is_hidden("#dropped")
     assert page.data("time") == "live"
@@ -101,6 +101,6 @@ def test_a_log_is_dropped_by_hand(visit: Visitor, office_server: Server, files: 
             dispatchEvent(new DragEvent(kind, { dataTransfer: carried, cancelable: true }));
         }
     }""")
-    page.page.wait_for_selector("#error-notice", state="visible", timeout=60_000)
+    page.page.wait_for_selector("#error-notice", state="visible")
     assert "empty.npz" in page.page.inner_text("#error-notice")
     page.problems = [problem for problem in page.problems if "422" not in problem]

@@ -26,6 +26,7 @@ def page(visit: Visitor, office_server: Server) -> Visit:
 def view_of(page: Visit) -> tuple[float, ...]:
     """Return scale and centre."""
     page.page.wait_for_timeout(150)
+    page.wait_for_frames()
     return tuple(float(value) for value in page.data("view").split()[:3])
 
 

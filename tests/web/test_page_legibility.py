@@ -66,6 +66,7 @@ def test_walls_of_one_cell_are_seen_at_every_scale(
     page.page.keyboard.press("-")
     for _ in range(9):
         page.page.wait_for_timeout(120)
+        page.wait_for_frames()
         px, py = page.pixel(700.5 * 0.05, 36.0)
         assert walls_across(page, px, py, wall) >= 1.5
         page.page.mouse.move(px, py)
@@ -188,6 +189,7 @@ def test_places_that_overlap_are_one_symbol_with_a_count(
     page.page.tap("#zoom-out")
     page.page.tap("#zoom-out")
     page.page.wait_for_timeout(300)
+    page.wait_for_frames()
     grouping = """async (hypotheses) => {
         const { groupsOf } = await import("/static/layers/groups.js");
         const scale = Number(document.getElementById("app").dataset.view.split(" ")[0]);

@@ -47,7 +47,7 @@ def test_the_entry_of_the_node_in_the_graph_arrives(dds, peer, reach, order):
         wait_for(lambda: "no message on" in node.log)
         robot = subprocess.Popen(arguments)
     try:
-        assert robot.wait(60.0) == 0
+        assert robot.wait(240.0) == 0
     finally:
         robot.kill()
         robot.wait()

@@ -290,7 +290,7 @@ def test_a_robot_of_humble_that_is_restricted_to_localhost_is_found(dds, order):
         wait_for(lambda: "no message on" in node.log)
         robot = subprocess.Popen(command)
     try:
-        assert robot.wait(60.0) == 0
+        assert robot.wait(240.0) == 0
     finally:
         robot.kill()
         robot.wait()

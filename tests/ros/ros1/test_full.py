@@ -18,7 +18,7 @@ from firstfix.lab.worlds.catalog import WORLDS
 
 pytestmark = pytest.mark.slow
 
-DRIVE_S = 30.0
+DRIVE_S = 15.0
 
 
 def test_a_drive_is_followed_at_the_rate_of_the_scans(ros1: Lab) -> None:

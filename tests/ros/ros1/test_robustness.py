@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from ros1_lab import Lab, Program, wait_until
+from ros1_lab import WITH_ROSOUT, Lab, Program, wait_until
 
 pytestmark = pytest.mark.slow
 
@@ -101,7 +101,7 @@ def test_the_node_registers_again_with_another_master(ros1: Lab) -> None:
     gone = time.time()
     # What is connected stays so.
     watcher.wait_for("amcl_pose", after=gone + 1.0)
-    ros1.master.start()
+    ros1.master.start(WITH_ROSOUT)
     node.wait_for_output("the master was restarted: registering anew")
     for topic in ("/amcl_pose", "/localization_status", "/rosout"):
         wait_until(lambda topic=topic: ros1.master.publishers(topic), lambda: node.output)
