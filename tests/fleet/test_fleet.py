@@ -8,13 +8,16 @@ from typing import Any
 
 import pytest
 from fleet_lab import narrow_views, scan_of
+from site_lab import ROOMS, draw
 
+from firstfix.belief.view import View
 from firstfix.core.estimate import Verdict
 from firstfix.core.se2 import SE2
 from firstfix.fleet import fleet as fleet_module
 from firstfix.fleet.engine import WorkerLostError
 from firstfix.fleet.fleet import Fleet, NotReadyError, UnknownMapError
 from firstfix.fleet.jobs import Follow, Prepare, ShardedSite, open_map, parts_for, run_job, spread
+from firstfix.io.maps.map_server import save_map
 from firstfix.io.maps.site_yaml import read_site
 from firstfix.site.query import SiteQuery
 from firstfix.site.result import SiteResult
@@ -165,6 +168,30 @@ def test_a_robot_is_followed_over_all_parts_and_a_loss_changes_nothing(
     for result, expected in zip(disturbed[1:], undisturbed[1:], strict=True):
         assert (result.verdict, result.reason) == (expected.verdict, expected.reason)
         assert result.map_probabilities == pytest.approx(expected.map_probabilities, abs=1e-9)
+
+
+def test_a_twin_that_differs_by_one_cupboard_stays_open(tmp_path: Path) -> None:
+    # The robot is where a cupboard was when the map was drawn. The other floor never had it.
+    save_map(draw([*ROOMS["ground"], (2.2, 5.2, 3.2, 6.0)]), tmp_path / "own.yaml")
+    save_map(draw(ROOMS["ground"]), tmp_path / "other.yaml")
+    way = [POSE, SE2(4.3, 1.9, 0.6), SE2(4.7, 2.1, 0.8)]
+    views = [View.of(scan_of("ground", pose, i), pose) for i, pose in enumerate(way)]
+
+    async def verdicts() -> list[Verdict]:
+        names = (("other",), ("own",))
+        fleet = Fleet(Here(ShardedSite(tmp_path, names, tmp_path / "cache", 10**9)), names)
+        await fleet.prepare()
+        belief, found = SiteBelief(), []
+        for view in views:
+            result, belief = await fleet.follow(belief, view)
+            found.append(result.verdict)
+        return found
+
+    assert asyncio.run(verdicts())[-1] is Verdict.UNIQUE, "a near copy is no rival"
+    (tmp_path / "site.yaml").write_text(
+        "maps:\n  own: {map: own.yaml, floor: 0}\n  other: {map: other.yaml, floor: 1}\n"
+    )
+    assert set(asyncio.run(verdicts())) == {Verdict.AMBIGUOUS}
 
 
 def test_a_lost_job_is_given_again(here: tuple[Here, Fleet]) -> None:
