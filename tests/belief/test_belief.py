@@ -18,6 +18,7 @@ from firstfix.core.grid import OCCUPIED, OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.search import Candidates
 from firstfix.lab.simulation.lidar import Lidar
 
 WIDE = Lidar(beams=180, sigma_m=0.01)
@@ -68,6 +69,23 @@ def test_one_scan_of_a_sensor_that_sees_much_may_decide(room, drive):
     belief = update(begin(room), view)
     assert belief.verdict is Verdict.UNIQUE
     assert is_at(belief.places[0].pose, truth)
+
+
+def test_a_view_enters_where_it_was_found_before_and_nowhere_else(four_rooms, drive):
+    start = SE2(*four_rooms.grid.to_map(np.array([60.0, 60.0])).tolist(), 0.5)
+    (view,) = drive(four_rooms.grid, start, [], WIDE)
+    found = Candidates(np.array([[60.0, 60.0, 0.5]]), np.zeros(1))
+    belief = update(begin(four_rooms), view, found)
+    assert [is_at(place.pose, start) for place in belief.places] == [True]
+    assert len(update(begin(four_rooms), view).places) > 1
+
+
+def test_a_view_that_was_found_nowhere_leaves_all_places_open(room, drive):
+    views = drive(room.grid, SE2(5.0, 2.5, 0.4), [SE2(0.5, 0.0, 0.0)] * 2, WIDE)
+    nowhere = Candidates(np.empty((0, 3)), np.empty(0))
+    belief = update(begin(room), views[0], nowhere)
+    assert (belief.places, belief.elsewhere) == ((), 1.0)
+    assert update(belief, views[1]).verdict is Verdict.UNIQUE
 
 
 def test_what_is_identical_stays_open(four_rooms, drive):

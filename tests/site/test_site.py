@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
 import pytest
 from site_lab import ROOMS, draw, save_rooms, scan_in
 
@@ -13,8 +15,14 @@ from firstfix.belief.prior import Near
 from firstfix.core.errors import InputError
 from firstfix.core.estimate import Verdict
 from firstfix.core.se2 import SE2
+from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.beams import Beams
+from firstfix.global_localization.look import look_into
+from firstfix.global_localization.search import Candidates
 from firstfix.io.maps.map_server import save_map
+from firstfix.site import views
 from firstfix.site.judge import judge_site
+from firstfix.site.look import PROMISING
 from firstfix.site.result import SiteResult
 from firstfix.site.site import Site
 
@@ -174,6 +182,40 @@ def test_maps_that_overlap_in_the_site_are_no_rivals(tmp_path: Path) -> None:
         "maps:\n  a: {map: ground, pose: [5, 0, 0]}\n  b: {map: ground, pose: [5, 0, 0]}\n"
     )
     assert Site.load(tmp_path).locate(scan_in("ground", POSE)).verdict is Verdict.UNIQUE
+
+
+def test_each_view_of_a_sensor_that_sees_much_is_looked_for_once_in_all_maps(
+    site: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks: list[int] = []
+
+    def counted(beams: Beams, maps: Sequence[MapFields], shortlist: int) -> list[Candidates]:
+        looks.append(len(maps))
+        return look_into(beams, maps, shortlist)
+
+    monkeypatch.setattr(views, "look_into", counted)
+    starts = [POSE, SE2(4.3, 1.9, 0.6), SE2(4.7, 2.1, 0.8)]
+    odometry = [POSE.inverse() @ pose for pose in starts]
+    scans = [scan_in("second", pose, i, float(i)) for i, pose in enumerate(starts)]
+    assert site.locate(scans, odometry).map_id == "second"
+    assert looks == [len(ROOMS)] * 3
+    scans = [scan_in("second", pose, i, float(i), **NARROW) for i, pose in enumerate(starts)]
+    site.locate(scans, odometry)
+    assert len(looks) == 3  # what fits everywhere is searched map by map
+
+
+def test_several_views_decide_in_a_site_of_many_maps(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    save_rooms(tmp_path)
+    for i in range(PROMISING):
+        corners = rng.uniform((0.0, 0.0), (7.0, 5.0), (3, 2))
+        boxes = [(x, y, x + 0.8, y + 0.6) for x, y in corners.tolist()]
+        save_map(draw(boxes), tmp_path / f"other_{i}.yaml")
+    starts = [POSE, SE2(4.3, 1.9, 0.6), SE2(4.7, 2.1, 0.8)]
+    scans = [scan_in("second", pose, i, float(i)) for i, pose in enumerate(starts)]
+    result = Site.load(tmp_path).locate(scans, [POSE.inverse() @ pose for pose in starts])
+    assert (result.verdict, result.map_id) == (Verdict.UNIQUE, "second"), result.reason
+    assert result.elsewhere > 0.01  # the looks may have lost the place
 
 
 NARROW = {"beams": 61, "fov": 1.2, "range_max": 4.0, "sigma_m": 0.01}

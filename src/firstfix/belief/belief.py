@@ -30,6 +30,7 @@ from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS
 from firstfix.global_localization.prior import Prior, check_prior
+from firstfix.global_localization.search import Candidates
 
 # A view brings news where the robot has moved or turned by this much.
 NEWS_M = 0.3
@@ -240,7 +241,7 @@ def predict(belief: Belief, T_odom_base: SE2) -> Belief:
     return replace(belief, odometry=T_odom_base)
 
 
-def update(belief: Belief, view: View) -> Belief:
+def update(belief: Belief, view: View, found: Candidates | None = None) -> Belief:
     """Weigh all places by a view, and let in the places that the view itself proposes.
 
     Parameters
@@ -249,6 +250,9 @@ def update(belief: Belief, view: View) -> Belief:
         The belief.
     view : View
         Scans and odometry of one time. A view from where the latest was taken joins it.
+    found : Candidates, optional
+        Where a search of several maps together has found the view in this one; by default the map
+        is searched.
 
     Returns
     -------
@@ -261,7 +265,7 @@ def update(belief: Belief, view: View) -> Belief:
     if hits < FEWEST_HITS:
         return _blind(belief, hits)
     window, held = _followed(belief, view)
-    entering, search = propose(window, belief.hints, belief.next_id, fields, config)
+    entering, search = propose(window, belief.hints, belief.next_id, fields, config, found)
     rival = rival_cost(entering, fields.grid.resolution)
     window = (*window[:-1], replace(window[-1], rival_cost=rival))
     held = rejoin(held, entering, window, fields)

@@ -18,6 +18,7 @@ from firstfix.fields.range_table import DIRECTIONS
 from firstfix.fields.search_grid import MAX_POSITIONS
 from firstfix.global_localization.look import find_places
 from firstfix.global_localization.prior import DEEPER, NEAR_LOG
+from firstfix.global_localization.search import Candidates
 
 _ALL_POSES = MAX_POSITIONS * DIRECTIONS
 
@@ -28,6 +29,7 @@ def propose(
     first_id: int,
     fields: MapFields,
     config: BeliefConfig,
+    found: Candidates | None = None,
 ) -> tuple[Tracks, SearchReport]:
     """Search the whole map for the newest view, and settle the best places on the walls.
 
@@ -43,6 +45,8 @@ def propose(
         The prepared map.
     config : BeliefConfig
         Settings.
+    found : Candidates, optional
+        What a search of several maps together has found in this one; it is not searched again.
 
     Returns
     -------
@@ -53,15 +57,24 @@ def propose(
     """
     seen = window[-1]
     sensor = seen.sensor
-    most = config.first_shortlist if len(window) == 1 else config.shortlist
-    depth = most * DEEPER if hints else most
-    candidates, report = find_places(sensor.beams, fields, depth, _ALL_POSES)
+    most = shortlist_of(config, is_first=len(window) == 1)
+    if found is None:
+        depth = most * DEEPER if hints else most
+        candidates, report = find_places(sensor.beams, fields, depth, _ALL_POSES)
+    else:
+        poses_of_map = len(fields.positions) * DIRECTIONS
+        candidates, report = found, SearchReport(poses_of_map, searched=1.0, proven=False)
     poses = compose(candidates.poses, inverse(sensor.T_base_laser))
     if hints:
         poses = poses[_best_and_hinted(poses, most, seen, hints, fields)]
     poses = settle(poses, seen, fields)
     ids = first_id + np.arange(len(poses))
     return Tracks.at(poses, costs(poses, seen, BEAMS, fields), ids), report
+
+
+def shortlist_of(config: BeliefConfig, *, is_first: bool) -> int:
+    """Return how many places enter by a view; a first view is searched more deeply."""
+    return config.first_shortlist if is_first else config.shortlist
 
 
 def _best_and_hinted(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from firstfix.fields.kernel_cache import kernel
+from firstfix.fields.kernel_cache import kernel, part
 from firstfix.fields.look_table import BLOCKS, LOOK_DIRECTIONS
 from firstfix.fields.range_table import DIRECTIONS
 from firstfix.fields.raycast import cast_ray_leaping
@@ -24,6 +24,17 @@ _HEADINGS = DIRECTIONS // SECTORS  # of a sector
 _LOOK_HEADINGS = LOOK_DIRECTIONS // SECTORS
 
 
+@part
+def _outside(
+    count: np.uint8, nearest: np.uint8, farthest: np.uint8, through: np.uint8, short: np.uint8
+) -> np.uint8:
+    """Return how far a range lies outside two others, with limits to both sides."""
+    return np.uint8(
+        min(np.uint8(max(count, farthest) - farthest), through)
+        + min(np.uint8(max(count, nearest) - count), short)
+    )
+
+
 @kernel
 def compare_bounds(  # noqa: PLR0913 - a kernel takes its arrays one by one
     bounds: NDArray[np.uint8],
@@ -38,70 +49,80 @@ def compare_bounds(  # noqa: PLR0913 - a kernel takes its arrays one by one
 ) -> None:
     """Compare all headings of every entry: sums of bytes, as `search._add_ranges`.
 
-    An entry that is above the limit at every heading is dropped.
+    An entry that is above the limit at every heading after some of the beams is dropped.
     """
     # Written twice, so that every heading is one slice.
     low, high = np.empty(2 * LOOK_DIRECTIONS, np.uint8), np.empty(2 * LOOK_DIRECTIONS, np.uint8)
     narrow, wide = np.empty(LOOK_DIRECTIONS, np.uint8), np.empty(LOOK_DIRECTIONS, np.uint16)
+    lowest = np.empty(LOOK_DIRECTIONS // 2, np.uint8)
+    headings = np.uint64(LOOK_DIRECTIONS)  # unsigned, so that LLVM can vectorise the loops
     n = directions.shape[0]
     for k in range(bounds.shape[0]):
-        least = penalties[k]
         nearest, farthest = bounds[k, 0], bounds[k, 1]
-        for h in range(LOOK_DIRECTIONS):
+        for h in range(headings):
             low[h] = nearest[h]
-            low[h + LOOK_DIRECTIONS] = nearest[h]
+            low[h + headings] = nearest[h]
             high[h] = farthest[h]
-            high[h + LOOK_DIRECTIONS] = farthest[h]
+            high[h + headings] = farthest[h]
             wide[h] = 0
         j = 0
-        while j < n and least <= limit:
-            for h in range(LOOK_DIRECTIONS):
+        while j < n:
+            for h in range(headings):
                 narrow[h] = 0
             end = min(n, j + _TOGETHER)
             while j < end:
-                a, b = low[directions[j] :], low[directions[j + 1] :]
-                c, d = low[directions[j + 2] :], low[directions[j + 3] :]
-                e, f = high[directions[j] :], high[directions[j + 1] :]
-                g, i = high[directions[j + 2] :], high[directions[j + 3] :]
+                a, b = np.uint64(directions[j]), np.uint64(directions[j + 1])
+                c, d = np.uint64(directions[j + 2]), np.uint64(directions[j + 3])
                 za, zb, zc, zd = counts[j], counts[j + 1], counts[j + 2], counts[j + 3]
                 ta, tb, tc, td = through[j], through[j + 1], through[j + 2], through[j + 3]
                 sa, sb, sc, sd = short[j], short[j + 1], short[j + 2], short[j + 3]
-                for h in range(LOOK_DIRECTIONS):
-                    p = np.uint8(
-                        min(np.uint8(max(za, e[h]) - e[h]), ta)
-                        + min(np.uint8(max(za, a[h]) - za), sa)
-                    )
-                    q = np.uint8(
-                        min(np.uint8(max(zb, f[h]) - f[h]), tb)
-                        + min(np.uint8(max(zb, b[h]) - zb), sb)
-                    )
-                    r = np.uint8(
-                        min(np.uint8(max(zc, g[h]) - g[h]), tc)
-                        + min(np.uint8(max(zc, c[h]) - zc), sc)
-                    )
-                    s = np.uint8(
-                        min(np.uint8(max(zd, i[h]) - i[h]), td)
-                        + min(np.uint8(max(zd, d[h]) - zd), sd)
-                    )
+                for h in range(headings):
+                    p = _outside(za, low[a + h], high[a + h], ta, sa)
+                    q = _outside(zb, low[b + h], high[b + h], tb, sb)
+                    r = _outside(zc, low[c + h], high[c + h], tc, sc)
+                    s = _outside(zd, low[d + h], high[d + h], td, sd)
                     narrow[h] += np.uint8(np.uint8(p + q) + np.uint8(r + s))
                 j += 4
-            for h in range(LOOK_DIRECTIONS):
+            for h in range(headings):
                 wide[h] += np.uint16(narrow[h])
-            lowest = np.uint16(65535)
-            for h in range(LOOK_DIRECTIONS):
-                lowest = min(lowest, wide[h])
-            least = np.uint16(lowest + penalties[k])
-        if least > limit:
-            scores[k] = LEVELS - 1
-            histogram[LEVELS - 1] += SECTORS
-            continue
-        for sector in range(SECTORS):
-            best = np.uint16(65535)
-            for h in range(_LOOK_HEADINGS):
-                best = min(best, wide[sector * _LOOK_HEADINGS + h])
-            best = np.uint16(min(LEVELS - 1, best + penalties[k]))
-            scores[k, sector] = best
-            histogram[best] += 1
+            if j <= _TOGETHER and _least(narrow, lowest) + np.int64(penalties[k]) > limit:
+                for sector in range(SECTORS):
+                    scores[k, sector] = LEVELS - 1
+                histogram[LEVELS - 1] += SECTORS
+                break
+        else:
+            _write_best(wide, penalties[k], scores[k], histogram)
+
+
+@part
+def _least(values: NDArray[np.uint8], scratch: NDArray[np.uint8]) -> np.int64:
+    """Return the smallest value, by halves: LLVM does not vectorise a minimum over all."""
+    half, quarter = np.uint64(LOOK_DIRECTIONS // 2), np.uint64(LOOK_DIRECTIONS // 4)
+    for h in range(half):
+        scratch[h] = min(values[h], values[h + half])
+    for h in range(quarter):
+        scratch[h] = min(scratch[h], scratch[h + quarter])
+    least = scratch[0]
+    for h in range(1, LOOK_DIRECTIONS // 4):
+        least = min(least, scratch[h])
+    return np.int64(least)
+
+
+@part
+def _write_best(
+    sums: NDArray[np.uint16],
+    penalty: np.uint16,
+    scores: NDArray[np.uint16],
+    histogram: NDArray[np.int64],
+) -> None:
+    """Write the score of the best heading in each sector, and count it."""
+    for sector in range(SECTORS):
+        best = np.uint16(65535)
+        for h in range(_LOOK_HEADINGS):
+            best = min(best, sums[sector * _LOOK_HEADINGS + h])
+        best = min(np.uint16(LEVELS - 1), np.uint16(best + penalty))
+        scores[sector] = best
+        histogram[best] += 1
 
 
 @kernel

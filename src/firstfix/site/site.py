@@ -29,7 +29,7 @@ from firstfix.site.result import SiteResult
 from firstfix.site.search import search_one_look
 from firstfix.site.site_belief import Followed, SiteBelief
 from firstfix.site.surroundings import surroundings
-from firstfix.site.views import search_views
+from firstfix.site.views import are_seen_together, search_views
 from firstfix.site.zones import zone_prior
 
 _log = logging.getLogger(__name__)
@@ -226,8 +226,9 @@ class Site:
         """
         started = time.perf_counter()
         query = self.query(scan, T_odom_base, prior)
-        # The search of one look is a look into all maps together: to rank maps before is no gain.
-        one_stage = query.is_one_look or len(self.map_ids) <= PROMISING
+        # A look into all maps together is the search itself: to rank maps before is no gain.
+        is_joint = query.is_one_look or are_seen_together(query)
+        one_stage = is_joint or len(self.map_ids) <= PROMISING
         looked = look_at_all(self.map_ids) if one_stage else self.first_look(query)
         found = self.search(query, looked.promising)
         result = judge_site(query, [looked], [found])

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firstfix.belief.belief import NEWS_M, NEWS_RAD, Belief, begin, update
+from firstfix.belief.config import BeliefConfig
+from firstfix.belief.enter import shortlist_of
 from firstfix.belief.evidence import WRONG_MAP_COST, log_likelihoods
 from firstfix.belief.hints import hint_logs
 from firstfix.belief.joint import joint_log_likelihoods, power_of
@@ -17,7 +19,13 @@ from firstfix.belief.planar import compose
 from firstfix.belief.prior import FLOOR
 from firstfix.belief.several import distinct_views
 from firstfix.belief.view import View
+from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.beams import FEWEST_HITS
 from firstfix.global_localization.lead import part_costs
+from firstfix.global_localization.look import look_into
+from firstfix.global_localization.prior import DEEPER
+from firstfix.global_localization.search import Candidates
+from firstfix.global_localization.sensors import joint_beams, see_enough
 from firstfix.site.maps import Maps, PreparedMap
 from firstfix.site.places import SitePlace
 from firstfix.site.query import SitePrior, SiteQuery
@@ -61,9 +69,44 @@ def search_views(
     totals : ndarray, shape (steps,)
         Logarithm of the likelihood of all places of all maps after each view.
     """
-    histories = [_history(query, maps(map_id)) for map_id in map_ids]
+    views = views_of(query)
+    found = (
+        _found_together(query, views, [maps(map_id).fields for map_id in map_ids])
+        if are_seen_together(query)
+        else [(None,) * len(views)] * len(map_ids)
+    )
+    histories = [
+        _history(query, views, maps(map_id), of_map)
+        for map_id, of_map in zip(map_ids, found, strict=True)
+    ]
     totals = np.logaddexp.reduce([history.totals for history in histories], axis=0)
     return tuple(place for history in histories for place in history.places), totals
+
+
+def are_seen_together(query: SiteQuery) -> bool:
+    """Tell whether each view is looked for in all maps together.
+
+    A sensor that sees little fits everywhere: then each map is searched by itself.
+    """
+    return all(see_enough(view.scans) for view in views_of(query))
+
+
+def _found_together(
+    query: SiteQuery, views: Sequence[View], maps: Sequence[MapFields]
+) -> list[tuple[Candidates | None, ...]]:
+    """Return, for each map, where each view may have been taken."""
+    config = BeliefConfig()
+    deeper = 1 if query.prior is None else DEEPER
+    looks: list[Sequence[Candidates | None]] = []
+    is_first = True
+    for view in views:
+        _, beams = joint_beams(view.scans)
+        if int(np.count_nonzero(beams.hit)) < FEWEST_HITS:  # nothing enters a belief by it
+            looks.append([None] * len(maps))
+            continue
+        looks.append(look_into(beams, maps, deeper * shortlist_of(config, is_first=is_first)))
+        is_first = False
+    return list(zip(*looks, strict=True))
 
 
 def views_of(query: SiteQuery) -> list[View]:
@@ -82,13 +125,18 @@ def has_moved(start: View, end: View, metres: float, radians: float) -> bool:
     return math.hypot(step.x, step.y) >= metres or abs(step.yaw) >= radians
 
 
-def _history(query: SiteQuery, prepared: PreparedMap) -> MapHistory:
+def _history(
+    query: SiteQuery,
+    views: Sequence[View],
+    prepared: PreparedMap,
+    found: Sequence[Candidates | None],
+) -> MapHistory:
     map_id = prepared.entry.id
     before = known_of(map_id, query.prior)
     belief = begin(prepared.fields, query.prior_in(map_id))
     steps: list[dict[int, float]] = []
-    for view in views_of(query):
-        belief = update(belief, view)
+    for view, candidates in zip(views, found, strict=True):
+        belief = update(belief, view, candidates)
         steps.append(
             dict(zip(belief.tracks.ids.tolist(), (logs_of(belief) + before).tolist(), strict=True))
         )
