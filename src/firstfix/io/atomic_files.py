@@ -50,7 +50,7 @@ def read_bytes(path: Path, *, what: str, limit: int) -> bytes:
         raise InputError(
             expected=f"{what} of at most {limit} bytes",
             received=f"a larger file, {path}",
-            remedy="check that it is the right file",
+            remedy="check that it is the right file, and that the paths are in the right order",
         )
     return data
 
