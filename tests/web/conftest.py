@@ -16,11 +16,16 @@ from recorder import Recorder
 from required import missing
 
 
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[page_lab.Profiles]:
-    """Give a browser; for a module, because its event loop is in the way of others."""
+@pytest.fixture(scope="session")
+def browser_is_there() -> None:
+    """Skip where there is no browser."""
     if why := page_lab.why_missing():
         missing("browser", why)
+
+
+@pytest.fixture(scope="module")
+def chromium(browser_is_there: None) -> Iterator[page_lab.Profiles]:
+    """Give a browser; for a module, because its event loop is in the way of others."""
     with page_lab.chromium() as browser:
         yield page_lab.Profiles(browser)
 
@@ -47,8 +52,8 @@ def visit(chromium: page_lab.Profiles) -> Iterator[Callable[..., page_lab.Visit]
     assert [problem for visited in visits for problem in visited.problems] == []
 
 
-@pytest.fixture(scope="module")
-def office_server(chromium: Any) -> Iterator[page_lab.Server]:
+@pytest.fixture(scope="session")
+def office_server(browser_is_there: None) -> Iterator[page_lab.Server]:
     """Give a robot in an office, where one scan is enough."""
     server = page_lab.Server("office", "--seed", "1").start()
     yield server
