@@ -20,7 +20,7 @@ from firstfix.global_localization.beams import Beams, usable_beams
 
 # Of the beams that can be compared, so many agree if the robot has not been carried. On floors 3100
 # to 3105 and three sensors, fewer do after 83 to 96 % of the kidnaps, and else only where wheels
-# have slipped, by 5 degrees or more.
+# have slipped, by 2 to 11 degrees.
 _LEAST_AGREEING = 0.7
 # More do in 19 of 20 scans, and after no kidnap there.
 _NEARLY_ALL = 0.95
