@@ -15,7 +15,7 @@ import time
 import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 from urllib.parse import urlsplit
 
 if TYPE_CHECKING:
@@ -164,16 +164,26 @@ class Visit:
         Of the browser.
     url : str
         Where to go.
+    color_scheme : {"light", "dark"}
+        Of the system.
     is_invited : bool
         Whether the tour is offered, as at a first visit.
     """
 
-    def __init__(self, context: BrowserContext, url: str, *, is_invited: bool = False) -> None:
+    def __init__(
+        self,
+        context: BrowserContext,
+        url: str,
+        color_scheme: Literal["light", "dark"] = "light",
+        *,
+        is_invited: bool = False,
+    ) -> None:
         self.problems: list[str] = []
         self._received = 0
         self._host = urlsplit(url).hostname
         self.page: Page = context.new_page()
         self.page.set_default_timeout(1000.0 * PATIENCE_S)
+        self.page.emulate_media(color_scheme=color_scheme)
         if not is_invited:
             self.page.add_init_script("localStorage.setItem('firstfix-tour', 'seen')")
         self.page.on("console", self._on_message)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 
@@ -40,10 +40,11 @@ def visit(chromium: page_lab.Profiles) -> Iterator[Callable[..., page_lab.Visit]
         device: dict[str, Any] = page_lab.DESKTOP,
         *,
         is_invited: bool = False,
+        color_scheme: Literal["light", "dark"] = "light",
         **options: Any,
     ) -> page_lab.Visit:
         profile = chromium.like_new(url, **device, **options)
-        visits.append(page_lab.Visit(profile, url, is_invited=is_invited))
+        visits.append(page_lab.Visit(profile, url, color_scheme, is_invited=is_invited))
         return visits[-1]
 
     yield open_page
