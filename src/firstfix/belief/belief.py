@@ -335,7 +335,7 @@ def _followed(belief: Belief, view: View) -> tuple[tuple[Observation, ...], Trac
         joined = window[-1].joined_by(view)
         return (*window[:-1], joined), at_rest(tracks, joined, fields)
     forgotten = belief.carried_at
-    if has_missed_enough(belief.misses, window):
+    if has_missed_enough(belief.misses, window, belief.judgement.favourite):
         forgotten = len(window) - 1
     if forgotten > 0:
         window, tracks = window[forgotten:], tracks.over(slice(forgotten, None))

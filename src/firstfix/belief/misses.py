@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from firstfix.belief.evidence import WRONG_MAP_COST
-from firstfix.belief.judge import ALONE_PROBABILITY, Judgement
+from firstfix.belief.judge import ALONE_PROBABILITY, Favourite, Judgement
 from firstfix.belief.tracks import Tracks
 from firstfix.belief.view import Link, Observation
 from firstfix.global_localization.places import distinct_places
@@ -14,14 +14,17 @@ from firstfix.global_localization.verdict import exponent_of, place_probabilitie
 MOST_MISSES = 2
 """After so many the robot has been moved, or its wheels have slipped: earlier views say nothing."""
 
-# If all views go on from each other, the robot was not moved: only wheels may have slipped.
+# A published place is kept longer if all views go on from each other: the robot was not moved, only
+# wheels may have slipped.
 _MOST_MISSES_IN_A_ROW = 8
 
 # Places of a view that are compared with its best one.
 _COMPARED = 24
 
 
-def has_missed_enough(misses: int, window: Sequence[Observation]) -> bool:
+def has_missed_enough(
+    misses: int, window: Sequence[Observation], favourite: Favourite | None
+) -> bool:
     """Tell whether the earlier views say nothing any more.
 
     Parameters
@@ -30,9 +33,12 @@ def has_missed_enough(misses: int, window: Sequence[Observation]) -> bool:
         Views in a row that the best place does not explain though others do.
     window : sequence of Observation
         The views, oldest first.
+    favourite : Favourite or None
+        The place that was sure before the newest view, if any.
     """
+    is_kept = favourite is not None and favourite.published
     goes_on = all(seen.link is Link.GOES_ON for seen in window[-_MOST_MISSES_IN_A_ROW:])
-    return misses >= (_MOST_MISSES_IN_A_ROW if goes_on else MOST_MISSES)
+    return misses >= (_MOST_MISSES_IN_A_ROW if is_kept and goes_on else MOST_MISSES)
 
 
 def count_misses(
