@@ -31,6 +31,10 @@ def test_a_floor_is_mostly_connected_free_space_within_walls(seed: int) -> None:
     assert len(random_free_poses(grid, np.random.default_rng(0), 3)) == 3
 
 
+def test_a_floor_without_a_corridor_is_no_court() -> None:
+    assert RandomFloor(10031).map().free_area > 100.0
+
+
 def test_the_world_has_the_frame_of_the_map_and_most_of_its_walls() -> None:
     for seed in range(5):
         floor = RandomFloor(seed, 700.0)

@@ -247,7 +247,8 @@ def _filled(
     block: Rectangle, corridors: frozenset[str], style: _Style, rng: np.random.Generator
 ) -> tuple[list[Space], list[Door]]:
     chance = rng.random()
-    if chance < style.court and len(corridors) < 4:
+    # A block without a corridor is the whole floor: a court would leave nothing of it.
+    if chance < style.court and 0 < len(corridors) < 4:
         return [Space(block, Use.COURT)], []
     if chance < style.court + style.hall or block.area_m2 < 1.2 * style.room:
         use = Use.ROOM
