@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from firstfix.core.estimate import LocateResult, Verdict
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
-from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import FEWEST_HITS, Beams, usable_beams
 from firstfix.global_localization.config import LocateConfig
@@ -42,7 +41,7 @@ from firstfix.global_localization.verdict import (
     place_probabilities,
 )
 from firstfix.global_localization.verify import Verification, verified_place, verify
-from firstfix.lab.experiments.case import Case, evenly_spaced, known_truth
+from firstfix.lab.experiments.case import Case, known_poses
 from firstfix.lab.experiments.locate_bench import try_scan
 from firstfix.lab.experiments.machine import this_machine
 from firstfix.lab.metrics.metrics import summarize, total
@@ -217,14 +216,11 @@ class AblationTask:
 def ablate_case(case: Case, grid: OccupancyGrid, limit: int) -> tuple[AblationRun, ...]:
     """Locate scans of a case, at most ``limit`` (0: all), with every step left out in turn."""
     recording, fields = case.recording(), MapFields(grid)
-    truth = known_truth(case, recording)
-    tried = evenly_spaced(np.flatnonzero(np.isfinite(truth).all(axis=1)), limit).tolist()
+    truth = known_poses(case, recording, limit)
     runs = []
     for without in Without:
         locate = AblatedMatcher(fields, without).answer
-        outcomes = [
-            try_scan(locate, recording.scans[i], SE2.from_array(truth[i]), i) for i in tried
-        ]
+        outcomes = [try_scan(locate, recording.scans[i], pose, i) for i, pose in truth.items()]
         runs.append(AblationRun(case.name, case.kind, without, tuple(outcomes)))
     return tuple(runs)
 

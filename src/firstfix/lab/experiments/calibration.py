@@ -31,8 +31,14 @@ from firstfix.global_localization.lead import RIVALS, leads_without_its_best_par
 from firstfix.global_localization.locate import SURE_OF_SMALL_VIEW
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.global_localization.sensors import are_surrounded, see_enough
-from firstfix.global_localization.verdict import EXPONENT, FLOOR, WRONG_MAP_COST, exponent_of
-from firstfix.lab.experiments.case import Case, evenly_spaced, known_truth, next_elsewhere
+from firstfix.global_localization.verdict import (
+    EXPONENT,
+    FLOOR,
+    WRONG_MAP_COST,
+    exponent_of,
+    log_likelihoods,
+)
+from firstfix.lab.experiments.case import Case, known_poses, next_elsewhere
 from firstfix.lab.experiments.machine import this_machine
 from firstfix.lab.metrics.outcome import is_found
 from firstfix.lab.reports.text import Row, columns_table
@@ -103,9 +109,9 @@ class Claim:
         """Return whether a law and the rules make this UNIQUE."""
         if not self.costs:
             return False
-        logs = (
-            -law.exponent * self.share * np.log(np.array([*self.costs, WRONG_MAP_COST]) + law.floor)
-        )
+        # The law with another floor is that of costs which are higher by the difference.
+        costs = np.array([*self.costs, WRONG_MAP_COST]) + (law.floor - FLOOR)
+        logs = log_likelihoods(costs, law.exponent * self.share)
         likelihoods = np.exp(logs - logs.max())
         return bool(likelihoods[0] / likelihoods.sum() >= max(law.threshold, self.needed))
 
@@ -142,14 +148,13 @@ class CalibrationTask:
         """Run in this process."""
         precompile()
         recording = self.case.recording()
-        truth = known_truth(self.case, recording)
-        tried = evenly_spaced(np.flatnonzero(np.isfinite(truth).all(axis=1)), self.limit).tolist()
+        truth = known_poses(self.case, recording, self.limit)
         own, other = ScanMatcher(self.case.grid()), ScanMatcher(self.on.grid())
         return CalibrationRun(
             self.case.site,
             self.case.sensor,
-            tuple(claim(own, recording.scans[i], SE2.from_array(truth[i])) for i in tried),
-            tuple(claim(other, recording.scans[i], None) for i in tried),
+            tuple(claim(own, recording.scans[i], pose) for i, pose in truth.items()),
+            tuple(claim(other, recording.scans[i], None) for i in truth),
         )
 
 

@@ -160,6 +160,24 @@ def truth_at(recording: Recording, index: int) -> SE2 | None:
     return SE2.from_array(recording.truth[index])
 
 
+def known_poses(case: Case, recording: Recording, limit: int) -> dict[int, SE2]:
+    """Return the scans of a case to try, evenly spaced, at most ``limit`` (0: all).
+
+    Returns
+    -------
+    dict of int to SE2
+        Index of each scan in the recording, and its true ``T_map_base``.
+
+    Raises
+    ------
+    InputError
+        If no true pose is known.
+    """
+    truth = known_truth(case, recording)
+    tried = evenly_spaced(np.flatnonzero(np.isfinite(truth).all(axis=1)), limit)
+    return {i: SE2.from_array(truth[i]) for i in tried.tolist()}
+
+
 def evenly_spaced(indices: NDArray[np.intp], limit: int) -> NDArray[np.intp]:
     """Thin out indices evenly, first and last kept, to at most ``limit`` (0: all)."""
     if limit <= 0 or len(indices) <= limit:

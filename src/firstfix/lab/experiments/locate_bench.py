@@ -13,7 +13,7 @@ from firstfix.core.estimate import Verdict
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.lab.experiments.bench_method import BenchMethod
-from firstfix.lab.experiments.case import Case, evenly_spaced, known_truth, next_elsewhere
+from firstfix.lab.experiments.case import Case, evenly_spaced, known_poses, next_elsewhere
 from firstfix.lab.experiments.process_pool import peak_rss_mb
 from firstfix.lab.metrics.outcome import Answer, Outcome, judge
 
@@ -96,15 +96,13 @@ class CaseTask:
             If the case cannot be loaded or has no true pose.
         """
         case, recording, grid = self.case, self.case.recording(), self.case.grid()
-        truth = known_truth(case, recording)
-        tried = evenly_spaced(np.flatnonzero(np.isfinite(truth).all(axis=1)), self.limit)
+        truth = known_poses(case, recording, self.limit)
         self.method.compile()
         start = time.process_time()
         locate = self.method.prepare(case.name, grid)
         prepare_s = time.process_time() - start
         outcomes = tuple(
-            try_scan(partial(locate, i), recording.scans[i], SE2.from_array(truth[i]), i)
-            for i in tried.tolist()
+            try_scan(partial(locate, i), recording.scans[i], pose, i) for i, pose in truth.items()
         )
         return CaseRun(
             case=case.name,
