@@ -72,7 +72,8 @@ _LEAST_VARIANCE_CELLS2 = 1.0 / 48.0
 # Neighbouring beams err together (the same wall drawn askew): this many count as one.
 _BEAMS_PER_EFFECTIVE_BEAM = 4.0
 # However many beams agree, a map is not truer than a quarter of a cell and a tenth of a degree.
-_MAP_COVARIANCE = np.diag([0.25**2, 0.25**2, math.radians(0.1) ** 2])
+MAP_COVARIANCE = np.diag([0.25**2, 0.25**2, math.radians(0.1) ** 2])
+"""Covariance of the errors of a map at one place: x, y (cells), heading (rad)."""
 
 
 def refine_on_field(
@@ -158,7 +159,7 @@ def refine_on_rays(
     )
     # Marginalise the depth of the walls: invert first, then drop its row and column.
     covariances = np.linalg.inv(information)[:, :3, :3] * variances[:, None, None]
-    return refined, covariances * _BEAMS_PER_EFFECTIVE_BEAM + _MAP_COVARIANCE
+    return refined, covariances * _BEAMS_PER_EFFECTIVE_BEAM + MAP_COVARIANCE
 
 
 @kernel

@@ -27,6 +27,7 @@ from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.map_localization import MapLocalization
 from firstfix.localizer.odometry_buffer import OdometryBuffer
 from firstfix.localizer.place_belief import PlaceBelief
+from firstfix.localizer.pose_fusion import SharpPose
 from firstfix.localizer.pose_monitor import PoseMonitor
 from firstfix.localizer.pose_tracker import PoseTracker, Tracked
 from firstfix.localizer.scan_queue import ScanQueue
@@ -62,7 +63,12 @@ _PARTS: Mapping[type[Any], Mapping[str, Any]] = {
     },
     OdometryBuffer: {"_kept": deque[Odometry]},
     SensorClocks: {"_clocks": dict[str, Clock], "_reported": set[str]},
-    PoseTracker: {"_track": Track | None, "_monitor": PoseMonitor, "_has_leapt": bool},
+    PoseTracker: {
+        "_track": Track | None,
+        "_sharp": SharpPose | None,
+        "_monitor": PoseMonitor,
+        "_has_leapt": bool,
+    },
     PoseMonitor: {
         "_contradicted_since": float | None,
         "_suspected_since": float | None,

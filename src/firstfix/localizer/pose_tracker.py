@@ -20,7 +20,7 @@ from firstfix.core.se2 import SE2
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.outputs import TrackedPose
-from firstfix.localizer.pose_fusion import fuse_with_scan
+from firstfix.localizer.pose_fusion import SharpPose, hold, sharpen
 from firstfix.localizer.pose_monitor import Fit, Judgement, PoseMonitor
 
 # The covariance of a search is that of one scan in a perfect map; the filter starts wider.
@@ -76,6 +76,7 @@ class PoseTracker:
         sensor = build_sensor(matcher.fields.grid, config.amcl)
         self._filter = Tracker(sensor, config.amcl, _inject_nothing)
         self._track: Track | None = None
+        self._sharp: SharpPose | None = None  # as published at the last scan
         self._monitor = PoseMonitor(matcher, config.monitor)
         self._has_leapt = False  # and no scan has fitted since
 
@@ -106,11 +107,12 @@ class PoseTracker:
         self._track = Track(start(around_pose(place.pose, covariance, n, self._rng)), T_odom_base)
         self._monitor = PoseMonitor(self._matcher, self._config.monitor)
         self._has_leapt = False
+        self._sharp = SharpPose(place.pose, covariance, T_odom_base)
         return TrackedPose(stamp, place.pose, covariance, place.pose @ T_odom_base.inverse())
 
     def stop(self) -> None:
         """Track nothing."""
-        self._track = None
+        self._track = self._sharp = None
 
     def follow(self, view: View, *, force_update: bool) -> Tracked:
         """Update the filter by a scan, judge the pose, sharpen it.
@@ -129,13 +131,16 @@ class PoseTracker:
         T_map_base = self._track.T_map_odom @ T_odom_base
         covariance = self._track.state.estimate.covariance
         judgement = self._monitor.judge(scans, T_odom_base, T_map_base, covariance)
+        estimate = SharpPose(T_map_base, covariance, T_odom_base)
         if judgement.fit is Fit.CONSISTENT:
             self._has_leapt = False
-            T_map_base, covariance = fuse_with_scan(
-                T_map_base, covariance, scans, self._matcher.fields
-            )
-        T_map_odom = T_map_base @ T_odom_base.inverse()
-        pose = TrackedPose(view.stamp, T_map_base, covariance, T_map_odom)
+            sharp = sharpen(estimate, scans, self._matcher.fields, self._sharp)
+        else:
+            sharp = hold(estimate, self._sharp)
+        self._sharp = sharp
+        T_map_odom = sharp.T_map_base @ T_odom_base.inverse()
+        found = sharp.covariance_on(self._matcher.fields.grid)
+        pose = TrackedPose(view.stamp, sharp.T_map_base, found, T_map_odom)
         return Tracked(pose, judgement, is_confirmed=not self._has_leapt)
 
     def doubt_odometry(self) -> None:
@@ -150,6 +155,7 @@ class PoseTracker:
         T_filter_base = self._track.state.estimate.pose.inverse() @ T_map_base
         # The odometry of the last update, had its frame always been the new one.
         self._track = replace(self._track, T_odom_base=now.T_odom_base @ T_filter_base.inverse())
+        self._sharp = None
         self._monitor = PoseMonitor(self._matcher, self._config.monitor)
 
 

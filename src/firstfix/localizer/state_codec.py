@@ -46,6 +46,7 @@ from firstfix.localizer.outputs import (
     Status,
     TrackedPose,
 )
+from firstfix.localizer.pose_fusion import SharpPose
 from firstfix.localizer.pose_tracker import Tracked
 from firstfix.localizer.sensor_clocks import Clock
 from firstfix.localizer.states import State
@@ -71,7 +72,7 @@ _CLASSES: dict[str, type[Any]] = {
         *(Evidence, Hypothesis, SearchReport),
         *(LocalizerConfig, LocateConfig, AmclConfig, MonitorConfig, BeliefConfig, ScansConfig),
         *(ChangesConfig, View, Observation, Tracks, Belief, judge.Favourite),
-        *(Particles, Cluster, FilterState, WeightHistory, Track, Tracked, Clock),
+        *(Particles, Cluster, FilterState, WeightHistory, Track, Tracked, SharpPose, Clock),
     )
 }
 _NAMES = {each: name for name, each in _CLASSES.items()}

@@ -20,7 +20,7 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.lab.experiments.drive import Drive, Sight
-from firstfix.localizer.pose_fusion import fuse_with_scan
+from firstfix.localizer.pose_fusion import SharpPose, sharpen
 
 
 def spread(sigma_m: float, sigma_deg: float) -> NDArray[np.float64]:
@@ -103,6 +103,7 @@ def follow_drive(
         The prepared map, to refine each pose as a localizer does; None keeps the filter's poses.
     """
     track: Track | None = None
+    sharp: SharpPose | None = None
     covariance = start_covariance
     for sight in drive.sights:
         T_odom_base, scans, before = sight.T_odom_base, (sight.scan, *sight.others), track
@@ -110,14 +111,16 @@ def follow_drive(
         if sight.begin_at is not None:
             particles = around_pose(sight.begin_at, covariance, config.max_particles, rng)
             track = tracker.begin(particles, T_odom_base, scans, rng)
-            covariance = TRUE_START
+            covariance, sharp = TRUE_START, None
         else:
             assert track is not None  # noqa: S101 - the first scan of a drive has a start
             track = tracker.follow(track, T_odom_base, scans, rng)
         T_map_odom, found = track.T_map_odom, track.state.estimate.covariance
         if fields is not None:
-            pose, found = fuse_with_scan(T_map_odom @ T_odom_base, found, scans, fields)
-            T_map_odom = pose @ T_odom_base.inverse()
+            filtered = SharpPose(T_map_odom @ T_odom_base, found, T_odom_base)
+            sharp = sharpen(filtered, scans, fields, sharp)
+            T_map_odom = sharp.T_map_base @ T_odom_base.inverse()
+            found = sharp.covariance_on(fields.grid)
         yield TrackedScan(
             sight=sight,
             T_map_base=T_map_odom @ T_odom_base,
