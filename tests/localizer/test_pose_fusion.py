@@ -10,8 +10,10 @@ import pytest
 from firstfix.core.angles import angle_error
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
+from firstfix.global_localization.frames import to_cells
 from firstfix.lab.simulation.lidar import Lidar
 from firstfix.lab.worlds.drawing import Drawing
+from firstfix.localizer import pose_fusion
 from firstfix.localizer.pose_fusion import SharpPose, hold, sharpen
 
 HERE = SE2(4.0, 3.0, 1.0)
@@ -81,6 +83,27 @@ def test_along_a_corridor_odometry_keeps_what_earlier_scans_have_fixed(corridor)
         track = sharpen(estimate, seen(corridor, truth, k, range_max=8.0), corridor, track)
     assert abs(track.T_map_base.x - truth.x) < 0.06
     assert math.sqrt(track.covariance[0, 0]) > 0.03
+
+
+@pytest.mark.parametrize(("scans", "ahead"), [(5, 0.0), (80, 0.25)])
+def test_a_refinement_that_leaps_and_fits_no_better_must_persist(
+    corridor, monkeypatch, scans, ahead
+):
+    """People along a bare corridor look like walls across it."""
+    middle = SE2(20.0, 1.2, 0.0)
+    leap = np.array([[0.25 / 0.05, 0.0, 0.0]])
+    refine = pose_fusion.refine_on_rays
+
+    def misled(poses, beams, fields):
+        moved, _ = refine(np.array([to_cells(fields.grid, scan, middle)]), beams, fields)
+        return moved + leap, np.diag([0.6**2, 0.4**2, 0.002**2])[None]
+
+    monkeypatch.setattr(pose_fusion, "refine_on_rays", misled)
+    track = sharp(middle)
+    for k in range(scans):
+        scan = seen(corridor, middle, k, range_max=8.0)
+        track = sharpen(filtered(middle), scan, corridor, track)
+    assert abs(track.T_map_base.x - middle.x - ahead) < 0.06
 
 
 @pytest.mark.parametrize("off", [SE2(1.0, 0.0, 0.0), SE2(0.0, 0.0, math.radians(30.0))])

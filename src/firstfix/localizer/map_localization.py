@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -250,7 +251,10 @@ class MapLocalization:
         if not self.places.still_holds(tracked.pose.T_map_base):
             return []
         best = self.places.places[0]
-        pose = self.tracker.start(view.stamp, view.T_odom_base, best)
+        # Its own covariance is that of a scan that fits nowhere near: too wide to start from.
+        there = tracked.pose
+        held = replace(best, pose=there.T_map_base, covariance=there.covariance)
+        pose = self.tracker.start(view.stamp, view.T_odom_base, held)
         reason = f"only {best.evidence.explained:.0%} of the beams fit, but the views before do"
         return [pose, self.status(view.stamp, reason, best.evidence)]
 

@@ -34,6 +34,8 @@ _FARTHEST_RAD = math.radians(10.0)
 _AGREEING = 11.3
 # The refinement and the cost do not count beams alike: it may cost a tenth more and be right.
 _NO_WORSE = 1.1
+# Costs that differ by less than this, nats a beam, do not tell two poses apart.
+_ALIKE = 0.05
 
 # What odometry adds to the covariance: m and rad per root of a metre, rad per root of a radian.
 # Wheels that differ turn a robot by 0.03 rad a metre, and do so all the time.
@@ -112,8 +114,8 @@ def sharpen(
     Returns
     -------
     SharpPose
-        The fused pose. Without a refinement that fits about as well as the estimate, it is the one
-        before, carried by odometry, if that does; else the estimate.
+        The fused pose; the one before, carried by odometry, where it fits as well as a refinement
+        that contradicts it; the estimate if neither fits about as well.
     """
     scan, beams = joint_beams(as_scans(scans))
     if np.count_nonzero(beams.hit) < FEWEST_HITS:
@@ -125,6 +127,8 @@ def sharpen(
         found.append(refine.from_pose(carried.T_map_base, estimate.T_map_base))
         if _goes_on(estimate, carried, found[0]):
             return carried.fused(found[0].T_map_base, found[0].noise)
+        if _agree(estimate, carried) and found[0].starts_best:
+            return carried
     found.append(refine.from_pose(estimate.T_map_base, estimate.T_map_base))
     best = min(found, key=lambda each: each.cost)
     is_near = _is_near(estimate.T_map_base, best.T_map_base)
@@ -169,6 +173,11 @@ class _Refined:
     @property
     def fits(self) -> bool:
         return self.cost <= _NO_WORSE * self.cost_of_estimate
+
+    @property
+    def starts_best(self) -> bool:
+        best = min(self.cost, self.cost_of_estimate)
+        return self.cost_at_start <= _NO_WORSE * best + _ALIKE
 
     @property
     def starts_well(self) -> bool:

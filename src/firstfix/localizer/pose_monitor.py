@@ -107,6 +107,7 @@ class PoseMonitor:
         T_odom_base: SE2,
         T_map_base: SE2,
         covariance: NDArray[np.float64] | None = None,
+        tracked: Hypothesis | None = None,
     ) -> Judgement:
         """Judge the tracked pose by a scan; in doubt search nearby, then everywhere.
 
@@ -120,6 +121,8 @@ class PoseMonitor:
             The tracked pose at the scan.
         covariance : ndarray, shape (3, 3), optional
             Of it: x (m), y (m), yaw (rad) in the map frame. None if the pose is exact.
+        tracked : Hypothesis, optional
+            The pose, scored by the scan. None scores it.
 
         Returns
         -------
@@ -129,7 +132,8 @@ class PoseMonitor:
             one of several places that look the same: a slip, or a kidnap to a similar place.
         """
         scans = as_scans(scans)
-        (tracked,) = self._matcher.score_poses(scans, [T_map_base])
+        if tracked is None:
+            (tracked,) = self._matcher.score_poses(scans, [T_map_base])
         before, self._last_cost = self._last_cost, tracked.score
         judgement = self._judge(scans, tracked, T_odom_base, T_map_base, covariance)
         has_jumped = before is not None and tracked.score - before > _SUDDEN_COST

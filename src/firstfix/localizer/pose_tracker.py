@@ -15,8 +15,9 @@ from firstfix.amcl.tracker import Track, Tracker
 from firstfix.belief.view import View
 from firstfix.core.estimate import Hypothesis
 from firstfix.core.odometry import Odometry
-from firstfix.core.scan import LaserScan
+from firstfix.core.scan import LaserScan, Scans
 from firstfix.core.se2 import SE2
+from firstfix.global_localization.places import is_same_place
 from firstfix.global_localization.scan_matcher import ScanMatcher
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.outputs import TrackedPose
@@ -25,6 +26,9 @@ from firstfix.localizer.pose_monitor import Fit, Judgement, PoseMonitor
 
 # The covariance of a search is that of one scan in a perfect map; the filter starts wider.
 _START_COVARIANCE = np.diag([0.03**2, 0.03**2, np.radians(1.0) ** 2])
+
+# The particles are brought back to a pose that fits so much better.
+_BETTER = 0.75
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +107,7 @@ class PoseTracker:
             The place.
         """
         covariance = place.covariance + _START_COVARIANCE
-        n = self._config.amcl.max_particles
-        self._track = Track(start(around_pose(place.pose, covariance, n, self._rng)), T_odom_base)
+        self._track = self._begun(place.pose, place.covariance, T_odom_base)
         self._monitor = PoseMonitor(self._matcher, self._config.monitor)
         self._has_leapt = False
         self._sharp = SharpPose(place.pose, covariance, T_odom_base)
@@ -128,10 +131,13 @@ class PoseTracker:
         scans, T_odom_base = view.scans, view.T_odom_base
         step = self._filter.update if force_update else self._filter.follow
         self._track = step(self._track, T_odom_base, scans, self._rng)
-        T_map_base = self._track.T_map_odom @ T_odom_base
-        covariance = self._track.state.estimate.covariance
-        judgement = self._monitor.judge(scans, T_odom_base, T_map_base, covariance)
-        estimate = SharpPose(T_map_base, covariance, T_odom_base)
+        estimate = self._estimate(self._track, T_odom_base)
+        (fitting,) = self._matcher.score_poses(scans, [estimate.T_map_base])
+        if fitting.score > self._config.monitor.doubtful_cost:
+            estimate, fitting = self._recalled(scans, estimate, fitting)
+        judgement = self._monitor.judge(
+            scans, T_odom_base, estimate.T_map_base, estimate.covariance, fitting
+        )
         if judgement.fit is Fit.CONSISTENT:
             self._has_leapt = False
             sharp = sharpen(estimate, scans, self._matcher.fields, self._sharp)
@@ -142,6 +148,31 @@ class PoseTracker:
         found = sharp.covariance_on(self._matcher.fields.grid)
         pose = TrackedPose(view.stamp, sharp.T_map_base, found, T_map_odom)
         return Tracked(pose, judgement, is_confirmed=not self._has_leapt)
+
+    def _estimate(self, track: Track, T_odom_base: SE2) -> SharpPose:
+        covariance = track.state.estimate.covariance
+        return SharpPose(track.T_map_odom @ T_odom_base, covariance, T_odom_base)
+
+    def _recalled(
+        self, scans: Scans, estimate: SharpPose, fitting: Hypothesis
+    ) -> tuple[SharpPose, Hypothesis]:
+        """Bring particles that people or a wrong map have led away back to the sharp pose."""
+        if self._sharp is None:
+            return estimate, fitting
+        T_odom_base = estimate.T_odom_base
+        carried = self._sharp.carried(T_odom_base)
+        (kept,) = self._matcher.score_poses(scans, [carried.T_map_base])
+        has_left = not estimate.agrees(carried.T_map_base, carried.covariance)
+        is_same = is_same_place(estimate.T_map_base, carried.T_map_base)
+        if not is_same or kept.score >= (1.0 if has_left else _BETTER) * fitting.score:
+            return estimate, fitting
+        self._track = self._begun(carried.T_map_base, carried.covariance, T_odom_base)
+        return self._estimate(self._track, T_odom_base), kept
+
+    def _begun(self, T_map_base: SE2, covariance: NDArray[np.float64], T_odom_base: SE2) -> Track:
+        n = self._config.amcl.max_particles
+        particles = around_pose(T_map_base, covariance + _START_COVARIANCE, n, self._rng)
+        return Track(start(particles), T_odom_base)
 
     def doubt_odometry(self) -> None:
         """Publish no pose until a scan fits: the odometry has leapt."""
