@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from firstfix.core.grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from firstfix.fields.map_fields import MapFields
 from firstfix.global_localization.beams import Beams
-from firstfix.global_localization.verify import BeamClass, beam_classes, verify
+from firstfix.global_localization.verify import BeamClass, beam_classes, beam_costs, verify
 
 RESOLUTION = 0.05
 
@@ -143,6 +143,21 @@ def test_the_score_is_a_mean_over_the_beams(yard, seed, n):
     assert min(alone) - 1e-9 <= score <= max(alone) + 1e-9
     twice = Beams(*(np.repeat(array, 2) for array in (beams.bearings, beams.ranges, beams.hit)))
     assert verify(poses, twice, yard).scores[0] == pytest.approx(score)
+
+
+@pytest.mark.parametrize("x_m", [2.0, 6.1])
+def test_the_costs_of_beams_sum_to_the_score(yard, x_m):
+    """At 6.1 m the sensor stands in the wall."""
+    poses = np.array([[x_m / RESOLUTION, 3.0 / RESOLUTION, 0.0], [*SENSOR[0, :2], 0.4]])
+    beams = Beams(np.linspace(-1.0, 1.0, 40), np.linspace(1.0, 8.0, 40), np.arange(40) % 5 > 0)
+    costs, _ = beam_costs(poses, beams, yard)
+    assert costs.sum(axis=1) == pytest.approx(verify(poses, beams, yard).scores)
+
+
+@pytest.mark.parametrize(("range_m", "cause_m"), [(2.5, 2.5), (4.02, 4.0), (5.5, 4.0)])
+def test_the_cause_of_a_cost_is_what_is_nearer_the_thing_or_the_wall(yard, range_m, cause_m):
+    _, causes = beam_costs(SENSOR, beam(EAST, range_m), yard)
+    assert causes == pytest.approx(np.array([[cause_m]]))
 
 
 def test_poses_and_beams_are_not_changed(yard):

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from firstfix.belief.config import BeliefConfig
 from firstfix.belief.elsewhere import missed_log_odds, rival_cost, with_missed
 from firstfix.belief.enter import propose
-from firstfix.belief.evidence import shares
+from firstfix.belief.evidence import EXPONENT, shares
 from firstfix.belief.hints import Hint, Source, hint_logs, log_anywhere
 from firstfix.belief.joint import carried_at, joint_log_likelihoods, power_of
-from firstfix.belief.judge import Judgement, Rule, judge
+from firstfix.belief.judge import Judgement, Rule, judge, withheld
+from firstfix.belief.lead import leads
 from firstfix.belief.merge import merge
 from firstfix.belief.misses import count_misses, has_missed_enough
 from firstfix.belief.place import listed_places
@@ -42,6 +43,8 @@ REST_RAD = math.radians(2.0)
 
 # A place with a smaller share is dropped. One that comes back is weighed by all views again.
 NEGLIGIBLE = 1e-6
+# By the law of one view: something that was moved speaks against the true place in many of them.
+_LEAST_HELD_LOG = math.log(NEGLIGIBLE) / EXPONENT
 
 # Best places whose beams are all compared.
 CAREFUL_PLACES = 24
@@ -277,7 +280,7 @@ def update(belief: Belief, view: View, found: Candidates | None = None) -> Belie
     tracks, logs = _ranked(tracks, window, belief)
 
     listed, _ = shares(logs, power_of(window))
-    kept = listed >= NEGLIGIBLE
+    kept = logs >= logs.max(initial=-math.inf) + _LEAST_HELD_LOG * power_of(window)
     tracks = tracks.take(kept)
     probabilities, missed = _with_missed(listed[kept], tracks, window, belief)
     rule = Rule(
@@ -289,6 +292,8 @@ def update(belief: Belief, view: View, found: Candidates | None = None) -> Belie
     judgement = judge(
         tracks.costs, tracks.ids, probabilities, window, belief.judgement.favourite, rule
     )
+    if judgement.is_new and not (rule.hinted or leads(tracks, window, fields, config)):
+        judgement = withheld(judgement)
     return replace(
         belief,
         window=window,

@@ -64,6 +64,28 @@ def joint_log_likelihoods(
     return logs
 
 
+def counted_since(
+    tracks: Tracks, window: Sequence[Observation], config: BeliefConfig
+) -> NDArray[np.int64]:
+    """Return the first view that counts for each track, shape (n,): 0 if it may have stayed.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Over all views of the window; at least one.
+    window : sequence of Observation
+        The views, oldest first.
+    config : BeliefConfig
+        Settings.
+    """
+    by_view = _by_view(tracks, window)
+    changes = _changes(window, config)
+    carried = [_carried_since(by_view, first) + carried_log for first, carried_log in changes]
+    likeliest = np.argmax([by_view.sum(axis=1), *carried], axis=0)
+    since: NDArray[np.int64] = np.array([0, *(first for first, _ in changes)])[likeliest]
+    return since
+
+
 def carried_at(
     tracks: Tracks,
     probabilities: NDArray[np.float64],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,12 +66,15 @@ class Judgement:
         The place that is sure, if one is.
     unexplained : bool
         True if the best place does not explain the newest view.
+    is_new : bool
+        True if the place may be published and was not before.
     """
 
     verdict: Verdict
     reason: str
     favourite: Favourite | None
     unexplained: bool = False
+    is_new: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,12 +161,24 @@ def judge(
     since = seen if known is None else known.since
     favourite = Favourite(int(ids[0]), since, published)
     if published:
-        return Judgement(Verdict.UNIQUE, _sure(len(window), hinted=hinted), favourite)
+        is_new = known is None or not known.published
+        reason = _sure(len(window), hinted=hinted)
+        return Judgement(Verdict.UNIQUE, reason, favourite, is_new=is_new)
     reason = (
         f"one place has {probabilities[0]:.0%} of the probability, but this sensor needs a second "
         f"view to be sure: drive {SECOND_LOOK_M} m or turn {math.degrees(SECOND_LOOK_RAD):.0f}°"
     )
     return Judgement(Verdict.AMBIGUOUS, reason, favourite)
+
+
+def withheld(judgement: Judgement) -> Judgement:
+    """Return the judgement of a place that is ahead of another by one thing only."""
+    assert judgement.favourite is not None  # noqa: S101 - it is sure
+    reason = (
+        "one place fits best, but another would fit as well but for one thing, which may have been "
+        "moved; motion may tell them apart"
+    )
+    return Judgement(Verdict.AMBIGUOUS, reason, replace(judgement.favourite, published=False))
 
 
 def _alone(newest: NDArray[np.float64], beams: Beams) -> float:

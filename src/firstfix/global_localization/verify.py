@@ -71,6 +71,8 @@ _LABELS = (
     "in unknown space",
 )
 
+_NO_DETAILS = np.empty((0, 0, 2))
+
 # As kernels take them.
 _EXPLAINED, _SHORT, _THROUGH, _UNKNOWN = (int(kind) for kind in BeamClass)
 
@@ -119,6 +121,34 @@ def verify(poses: NDArray[np.float64], beams: Beams, fields: MapFields) -> Verif
     """
     scores, counts, _ = _compared(poses, beams.thinned(BEAMS), fields)
     return Verification(poses, scores, counts)
+
+
+def beam_costs(
+    poses: NDArray[np.float64], beams: Beams, fields: MapFields
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what each beam adds to the mean cost of a scan, and how far away the cause is.
+
+    Parameters
+    ----------
+    poses : ndarray, shape (n, 3)
+        x, y (cells), heading (rad) of the sensor in the grid.
+    beams : Beams
+        The scan.
+    fields : MapFields
+        The prepared map.
+
+    Returns
+    -------
+    costs : ndarray, shape (n, len(beams))
+        Nats; a row sums to the score of `verify`.
+    causes : ndarray, shape (n, len(beams))
+        Distance from the sensor to the thing that was measured or to the wall that was expected,
+        whichever is nearer, m.
+    """
+    details = np.zeros((len(poses), len(beams), 2))
+    details[..., 0] = _INSIDE_WALL_COST / max(1, len(beams))
+    _compared(poses, beams, fields, details)
+    return details[..., 0], details[..., 1]
 
 
 def verified_place(
@@ -191,9 +221,12 @@ def beam_weights(beams: Beams) -> NDArray[np.float64]:
 
 
 def _compared(
-    poses: NDArray[np.float64], used: Beams, fields: MapFields
+    poses: NDArray[np.float64],
+    used: Beams,
+    fields: MapFields,
+    details: NDArray[np.float64] = _NO_DETAILS,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.uint8]]:
-    """Return scores (n,), counts (n, 4) and classes (n, beams)."""
+    """Return scores (n,), counts (n, 4), classes (n, beams); fill details (n, beams, 2)."""
     weights = beam_weights(used)
     scores = np.empty(len(poses))
     counts = np.zeros((len(poses), 4), np.int64)
@@ -215,6 +248,7 @@ def _compared(
         scores,
         counts,
         classes,
+        details,
     )
     return scores, counts, classes
 
@@ -270,6 +304,13 @@ def _is_shallow(
     return False
 
 
+@part
+def _note(details: NDArray[np.float64], k: int, i: int, cost: float, cause: float) -> None:
+    """Keep what one beam costs and where its cause is, if somebody asks for it."""
+    if details.size > 0:
+        details[k, i, 0], details[k, i, 1] = cost, cause
+
+
 @kernel
 def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
     poses: NDArray[np.float64],
@@ -288,6 +329,7 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
     scores: NDArray[np.float64],
     counts: NDArray[np.int64],
     classes: NDArray[np.uint8],
+    details: NDArray[np.float64],
 ) -> None:
     height, width = squares.shape
     for k in range(poses.shape[0]):
@@ -346,5 +388,6 @@ def _verify(  # noqa: PLR0913 - a kernel takes its arrays one by one
                 if _meets(changed, (start_x, start_y), (dx, dy), lengths):
                     differs, classes[k, i] = _CHANGED_COST, _UNKNOWN
             cost += weights[i] * differs
+            _note(details, k, i, weights[i] * differs, min(ranges[i], expected))
             counts[k, classes[k, i]] += 1
         scores[k] = cost

@@ -23,7 +23,7 @@ from firstfix.localizer.hint import Hint, read_hint
 from firstfix.localizer.inputs import NewMap, PoseHint, PositionFix
 from firstfix.localizer.outputs import Hypotheses, InitialPose, Output, Status
 from firstfix.localizer.place_belief import Pace, PlaceBelief, Support
-from firstfix.localizer.pose_monitor import Fit
+from firstfix.localizer.pose_monitor import Fit, is_slip
 from firstfix.localizer.pose_tracker import PoseTracker, Tracked
 from firstfix.localizer.scan_queue import ScanQueue
 from firstfix.localizer.states import Event, State, next_state
@@ -216,10 +216,8 @@ class MapLocalization:
         if tracked.judgement.has_jumped:
             self.places.suspect_kidnap()
         if fit is Fit.ELSEWHERE:
-            away = place.pose.distance_to(tracked.pose.T_map_base)
             if not is_same_place(place.pose, tracked.pose.T_map_base):
-                reason = f"found {away:.1f} m from the tracked pose"
-                return self._arrive(view, place, Event.RELOCALIZED, reason)
+                return self._move(view, place, tracked)
             corrected = self.tracker.start(view.stamp, view.T_odom_base, place)
             if not self.places.prefers(place.pose):
                 self.places.restart()  # the wheels slipped: earlier views are not where they seem
@@ -243,6 +241,16 @@ class MapLocalization:
             self._count_changes(view, tracked)
         reason = self._unless_chosen(tracked.fit_in_words)
         return [tracked.pose, self.status(view.stamp, reason, place.evidence)]
+
+    def _move(self, view: View, place: Hypothesis, tracked: Tracked) -> list[Output]:
+        """Go where single scans put the robot; far away, if they do so by more than one thing."""
+        is_near = is_slip(tracked.pose.T_map_base, place.pose)
+        if not is_near and not self.places.would_begin_at(place.pose, view):
+            self._weigh(view, Pace.EVERY_SCAN)
+            return self._withdraw(view)
+        away = place.pose.distance_to(tracked.pose.T_map_base)
+        reason = f"found {away:.1f} m from the tracked pose"
+        return self._arrive(view, place, Event.RELOCALIZED, reason)
 
     def _hold(self, view: View, tracked: Tracked) -> list[Output]:
         """Go on where the belief puts the robot, if not it has changed but what is around it."""

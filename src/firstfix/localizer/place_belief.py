@@ -245,6 +245,12 @@ class PlaceBelief:
         is_settled = self._credit >= _CONFIRMING_VIEWS and self._views_against == 0
         return Pace.BACKGROUND if is_settled else Pace.EVERY_VIEW
 
+    def would_begin_at(self, T_map_base: SE2, view: View) -> bool:
+        """Tell whether a belief without a past would be sure of this place by one view."""
+        fresh = update(begin(self._fields, None, self._config), view)
+        is_sure = fresh.verdict is Verdict.UNIQUE
+        return is_sure and is_same_place(SE2.from_array(fresh.poses[0]), T_map_base)
+
     def still_holds(self, T_map_base: SE2) -> bool:
         """Tell whether the robot must be here, though its newest scans do not fit.
 

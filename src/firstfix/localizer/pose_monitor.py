@@ -161,7 +161,7 @@ class PoseMonitor:
             self._suspected_since = stamp
         place = self._better_place(scans, tracked, T_map_base)
         if place is not None and self._is_confirmed(place, T_odom_base):
-            if not _is_slip(T_map_base, place.pose) or self._may_follow(scans, place, T_odom_base):
+            if not is_slip(T_map_base, place.pose) or self._may_follow(scans, place, T_odom_base):
                 self._withdraw_doubt()
                 return Judgement(Fit.ELSEWHERE, place)
             self._agreement.clear()
@@ -205,7 +205,7 @@ class PoseMonitor:
         near = self._matcher.search_locally(scans, T_map_base)
         as_usual = max(_GOOD_COST, _AS_USUAL * self._usual_cost)
         fits = near.score <= min(as_usual, self._config.doubtful_cost, _BETTER * tracked.score)
-        if fits and _is_slip(T_map_base, near.pose):
+        if fits and is_slip(T_map_base, near.pose):
             return near
         if tracked.score <= self._config.contradiction_cost:
             return None  # most of the scan fits here: people, or the edge of the map
@@ -291,6 +291,7 @@ class PoseMonitor:
         self._agreement.clear()
 
 
-def _is_slip(a: SE2, b: SE2) -> bool:
+def is_slip(a: SE2, b: SE2) -> bool:
+    """Tell whether wheels may have slipped from one pose to the other."""
     off = a.inverse() @ b
     return math.hypot(off.x, off.y) <= _SLIP_M and abs(off.yaw) <= _SLIP_RAD
