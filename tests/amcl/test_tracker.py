@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from firstfix.amcl.config import AmclConfig
-from firstfix.amcl.filter import step
+from firstfix.amcl.filter import start, step
 from firstfix.amcl.initial import around_pose
 from firstfix.amcl.sensor import build_sensor
 from firstfix.amcl.tracker import Track, Tracker
@@ -159,3 +159,19 @@ def test_standing_still_does_not_make_sure(room, seed):
         assert len(np.unique(track.state.particles.x)) > 50
     assert (np.array(errors) < 14.16).mean() >= 0.95
     assert track.state.estimate.pose.distance_to(truth) < 0.1
+
+
+def test_steps_that_scans_have_confirmed_spread_the_particles_half_as_much(room):
+    """The noise of the odometry is halved if every step since the last update is confirmed."""
+    blind = LaserScan(np.full(60, np.nan, np.float32), -math.pi, math.tau / 60, 0.1, 12.0)
+    at_one_place = around_pose(POSE, np.diag([1e-12] * 3), 300, np.random.default_rng(0))
+    tracker, spreads = tracker_of(room), []
+    for before, now in ((4, 4), (4, 5), (None, None), (None, 4), (4, None)):
+        rng = np.random.default_rng(1)
+        track = Track(start(at_one_place), ODOM, before)
+        after = tracker.follow(track, ODOM @ SE2(0.4, 0.0, 0.0), blind, rng, now)
+        assert after.unconfirmed == now
+        spreads.append(np.hypot(np.std(after.state.particles.x), np.std(after.state.particles.y)))
+    confirmed, *others = spreads
+    assert confirmed == pytest.approx(0.5 * others[0], rel=0.1)
+    assert others == pytest.approx([others[0]] * 4)

@@ -136,10 +136,22 @@ def test_a_slip_too_small_for_a_doubt_is_corrected_at_rest(in_hall, metres, of, 
     assert is_at(of(TrackedPose, outputs)[-1].T_map_base, in_hall.pose, 0.1, 3.0)
 
 
-def test_a_corrected_slip_costs_nothing_of_what_is_known(in_hall, of):
+def test_a_slip_that_scans_show_costs_nothing(in_hall, of, is_at):
     in_hall.ticks(60, A_STEP)
     known = len(in_hall.localizer.belief.window)
     assert known >= 4
+    in_hall.pose = in_hall.pose @ SE2(0.2, 0.0, math.radians(8.0))
+    outputs = in_hall.ticks(30)
+    assert len(of(TrackedPose, outputs)) == 30
+    assert all(is_at(each.T_map_base, in_hall.pose, 0.1, 2.0) for each in of(TrackedPose, outputs))
+    assert len(in_hall.localizer.belief.window) >= known
+
+
+def test_a_slip_that_no_scan_saw_costs_nothing_of_what_is_known(in_hall, of, with_ranges):
+    in_hall.ticks(60, A_STEP)
+    known = len(in_hall.localizer.belief.window)
+    assert known >= 4
+    in_hall.ticks(5, None, with_ranges(lambda _: math.nan))
     in_hall.pose = in_hall.pose @ SE2(0.2, 0.0, math.radians(8.0))
     said = [status.reason for status in of(Status, in_hall.ticks(30))]
     assert "corrected" in said

@@ -129,8 +129,12 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "monitor.confirmations": {"to": 5, "in": "a fast robot"},
     "monitor.rest_period_s": {"to": 0.05, "in": "rooms"},
     # The slip of this drive: a filter that does not update leaves it to the monitor.
-    "monitor.correct_m": {"to": 1.0, "with": STILL},
-    "monitor.correct_rad": {"to": 0.003, "with": STILL | {"monitor.correct_m": 1.0}},
+    "monitor.correct_m": {"to": 1.0, "in": "the dark", "with": STILL},
+    "monitor.correct_rad": {
+        "to": 0.003,
+        "in": "the dark",
+        "with": STILL | {"monitor.correct_m": 1.0},
+    },
     "monitor.decided_cost": {"to": 0.002, "in": "a fast robot"},
     "monitor.decided_views": {"to": 1, "in": "a loss", "with": {"belief.window": 1}},
     "belief.window": {"to": 1, "in": "rooms"},
@@ -164,6 +168,7 @@ class Drive:
         carried_to: SE2,
         *,
         blinded: int = 0,
+        covered: int = 0,
         scans: int = 20,
         reach: float = math.inf,
         sweep_s: float = 0.0,
@@ -182,6 +187,8 @@ class Drive:
                 scan[1].ranges = np.where(scan[1].ranges > reach, np.inf, scan[1].ranges)
             if 0 <= i - 12 < blinded:  # it fits nowhere
                 scan[1].ranges = 2.0 + np.sin(np.arange(180.0) * i).astype(np.float32)
+            if 0 <= i - 8 < covered:  # else the scans before and after the slip show it
+                scan[1].ranges = np.full(180, np.nan, np.float32)
             scan[1].time_increment = sweep_s / 180
             self.messages += [tf, (Channel.CLOUD, cloud_of(wire, scan[1])) if as_points else scan]
             robot.move(motion if i % 2 else SE2.identity(), 0.25)
@@ -222,6 +229,7 @@ def drives(ros2: Any, hall_plan: OccupancyGrid) -> dict[str, Drive]:
         "a loss": Drive(
             ros2, hall_plan, SE2(1.5, 1.5, 0.2), SE2(6.9, 3.0, 1.5), blinded=11, scans=32
         ),
+        "the dark": Drive(ros2, hall_plan, SE2(3.0, 2.5, 0.4), SE2(7.5, 5.0, -1.5), covered=1),
         "a short sensor": Drive(
             ros2, hall_plan, SE2(3.0, 2.5, 0.4), SE2(7.5, 5.0, -1.5), reach=4.0
         ),

@@ -64,17 +64,17 @@ def link(before: View, now: View) -> tuple[Link, bool]:
     step = before.T_odom_base.inverse() @ now.T_odom_base
     if math.hypot(step.x, step.y) > _MOST_M or abs(step.yaw) > _MOST_RAD:
         return Link.UNKNOWN, False
-    agreeing = _agreeing(before, now, step)
-    if math.isnan(agreeing):
+    share = agreeing(before, now, step)
+    if math.isnan(share):
         return Link.UNKNOWN, False
-    if agreeing >= _LEAST_AGREEING:
-        return Link.GOES_ON, agreeing >= _NEARLY_ALL
-    slips = (_agreeing(before, now, step @ SE2(0.0, 0.0, float(turn))) for turn in _SLIPS_RAD)
-    has_slipped = any(share >= _LEAST_AFTER_SLIP for share in slips)
+    if share >= _LEAST_AGREEING:
+        return Link.GOES_ON, share >= _NEARLY_ALL
+    slips = (agreeing(before, now, step @ SE2(0.0, 0.0, float(turn))) for turn in _SLIPS_RAD)
+    has_slipped = any(slipped >= _LEAST_AFTER_SLIP for slipped in slips)
     return (Link.UNKNOWN if has_slipped else Link.BROKEN), False
 
 
-def _agreeing(before: View, now: View, step: SE2) -> float:
+def agreeing(before: View, now: View, step: SE2) -> float:
     """Return the share of the beams that agree if the base moved so; NaN if too few can."""
     agree = against = 0
     for one, other in zip(before.scans, now.scans, strict=False):

@@ -54,6 +54,8 @@ class View:
         Pose of the base in the odometry frame.
     link : Link
         Whether all scans since the view before go on from each other: `link.link`.
+    unconfirmed : int or None
+        Steps of the odometry so far that no two scans have confirmed; None if nobody counts them.
 
     Raises
     ------
@@ -64,6 +66,7 @@ class View:
     scans: tuple[LaserScan, ...]
     T_odom_base: SE2
     link: Link = Link.UNKNOWN
+    unconfirmed: int | None = None
 
     def __post_init__(self) -> None:
         if not self.scans:

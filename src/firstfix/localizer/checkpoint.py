@@ -22,6 +22,7 @@ from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.global_localization.prior import Prior
 from firstfix.localizer.agreement import AgreementCounter
+from firstfix.localizer.checked_odometry import CheckedOdometry
 from firstfix.localizer.hint import Hint
 from firstfix.localizer.localizer import Localizer
 from firstfix.localizer.map_localization import MapLocalization
@@ -39,6 +40,7 @@ _PARTS: Mapping[type[Any], Mapping[str, Any]] = {
     Localizer: {
         "_rng": np.random.Generator,
         "_scans": ScanQueue,
+        "_odometry": CheckedOdometry,
         "_view": View | None,
         "_lifted": set[SignalKind],
         "_in_map": MapLocalization,
@@ -61,6 +63,7 @@ _PARTS: Mapping[type[Any], Mapping[str, Any]] = {
         "_used_until": float,
         "_valid_since": float,
     },
+    CheckedOdometry: {"_before": View | None, "_T_checked_odom": SE2, "_unconfirmed": int},
     OdometryBuffer: {"_kept": deque[Odometry]},
     SensorClocks: {"_clocks": dict[str, Clock], "_reported": set[str]},
     PoseTracker: {

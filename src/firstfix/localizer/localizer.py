@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,9 @@ from firstfix.core.arguments import as_instance
 from firstfix.core.errors import InputError
 from firstfix.core.odometry import Odometry, Signal, SignalKind
 from firstfix.core.scan import LaserScan
+from firstfix.core.se2 import SE2
 from firstfix.global_localization.scan_matcher import ScanMatcher
+from firstfix.localizer.checked_odometry import CheckedOdometry
 from firstfix.localizer.config import LocalizerConfig
 from firstfix.localizer.inputs import (
     Input,
@@ -26,7 +29,7 @@ from firstfix.localizer.inputs import (
     check_input,
 )
 from firstfix.localizer.map_localization import MapLocalization
-from firstfix.localizer.outputs import Output, Status
+from firstfix.localizer.outputs import Output, Status, TrackedPose
 from firstfix.localizer.scan_queue import ScanQueue
 from firstfix.localizer.states import Event, State
 
@@ -63,6 +66,7 @@ class Localizer:
         self._cache_dir = cache_dir
         self._rng = np.random.default_rng(self.config.amcl.seed)
         self._scans = ScanQueue(self.config.scans)
+        self._odometry = CheckedOdometry()
         self._view: View | None = None
         self._lifted: set[SignalKind] = set()
         self._in_map: MapLocalization | None = None
@@ -125,7 +129,17 @@ class Localizer:
         """
         check_input(given)
         earlier = [] if self._in_map is None else self._in_map.weigh_in_background()
-        return [*earlier, *self._process(given)]
+        return [*self._for_the_base(earlier), *self._for_the_base(self._process(given))]
+
+    def _for_the_base(self, outputs: list[Output]) -> list[Output]:
+        """Say the drift of the odometry as it comes, without our corrections."""
+        T_checked_odom = self._odometry.T_checked_odom
+        return [
+            replace(output, T_map_odom=output.T_map_odom @ T_checked_odom)
+            if isinstance(output, TrackedPose)
+            else output
+            for output in outputs
+        ]
 
     def _process(self, given: Input) -> list[Output]:
         if isinstance(given, NewMap):
@@ -143,7 +157,7 @@ class Localizer:
         if isinstance(given, PoseHint):
             return self._in_map.take_hint(given)
         if isinstance(given, PositionFix):
-            return self._in_map.take_fix(given)
+            return self._in_map.take_fix(given, self._checked(given.stamp))
         if isinstance(given, Reset):
             return self._take_reset(given, self._in_map)
         if isinstance(given, MapHint):
@@ -180,7 +194,9 @@ class Localizer:
         if has_leapt or has_jumped:
             in_map.tracker.doubt_odometry()
         if has_jumped and before is not None:
-            return in_map.change_frame(before, given)
+            T_odom_base = self._odometry.T_checked_odom @ before.T_odom_base
+            self._odometry.restart()
+            return in_map.change_frame(replace(before, T_odom_base=T_odom_base), given)
         return self._use_next_scan(in_map)
 
     def _take_signal(self, given: Signal, in_map: MapLocalization) -> list[Output]:
@@ -225,5 +241,9 @@ class Localizer:
             return [in_map.status(view.stamp, reason)]
         if self.state is State.LIFTED or not self._scans.is_valid(view):
             return []
-        self._view = view
-        return in_map.use(view)
+        self._view = self._odometry.check(view)
+        return in_map.use(self._view)
+
+    def _checked(self, stamp: float) -> SE2 | None:
+        T_odom_base = self._scans.odometry.at(stamp)
+        return None if T_odom_base is None else self._odometry.T_checked_odom @ T_odom_base

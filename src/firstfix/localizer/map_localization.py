@@ -118,11 +118,11 @@ class MapLocalization:
         reason = f"{given.source} proposes a pose: the next scan will verify it"
         return [self.status(given.stamp, reason)]
 
-    def take_fix(self, given: PositionFix) -> list[Output]:
-        """Add a measured position to the belief."""
+    def take_fix(self, given: PositionFix, T_odom_base: SE2 | None) -> list[Output]:
+        """Add a measured position, and the odometry at its time if that is known, to the belief."""
         try:
             prior = Gaussian(given.T_map_base, given.covariance)
-            self.places.take_fix(given.source, prior, self._scans.odometry.at(given.stamp))
+            self.places.take_fix(given.source, prior, T_odom_base)
         except InputError as error:
             return [self.status(given.stamp, f"{given.source} refused: {error}")]
         return []

@@ -130,7 +130,7 @@ class PoseTracker:
         assert self._track is not None  # noqa: S101 - `start` comes first
         scans, T_odom_base = view.scans, view.T_odom_base
         step = self._filter.update if force_update else self._filter.follow
-        self._track = step(self._track, T_odom_base, scans, self._rng)
+        self._track = step(self._track, T_odom_base, scans, self._rng, view.unconfirmed)
         estimate = self._estimate(self._track, T_odom_base)
         (fitting,) = self._matcher.score_poses(scans, [estimate.T_map_base])
         if fitting.score > self._config.monitor.doubtful_cost:

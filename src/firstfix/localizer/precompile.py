@@ -56,9 +56,11 @@ def _run(config: AmclConfig, methods: frozenset[Method]) -> None:
     localizer.handle(NewMap(0.0, grid))
     for i in range(_SCANS):
         stamp = i * _STEP_S
-        # Odometry moves, so that the filter updates; the scans do not follow it.
-        localizer.handle(Odometry(stamp, SE2(0.05 * i, 0.0, 0.0)))
+        moved = SE2(0.05 * i, 0.0, 0.0)  # so that the filter updates
+        localizer.handle(Odometry(stamp, moved))
         at = _HERE if i < _SCANS // 2 else _THERE
+        # Scans that do not follow the odometry would contradict it.
+        at = at @ SE2(0.05 * (i % (_SCANS // 2)), 0.0, 0.0)
         localizer.handle(replace(scan_of(grid, at), stamp=stamp))
     _search_again(localizer, grid)
     for method in methods:

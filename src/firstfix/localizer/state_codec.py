@@ -197,7 +197,7 @@ class Decoder:
         self._counted = 0
         decoded = self._value(value)
         if not _matches(decoded, hint):
-            raise _damaged(f"a {type(decoded).__name__} where {hint} belongs")
+            raise _damaged(f"a {type(decoded).__name__} where {hint!s:.80} belongs")
         return decoded
 
     def _make(self, node: list[Any]) -> Any:

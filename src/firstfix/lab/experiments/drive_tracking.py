@@ -14,12 +14,14 @@ from firstfix.amcl.config import AmclConfig
 from firstfix.amcl.initial import around_pose, free_poses
 from firstfix.amcl.sensor import build_sensor
 from firstfix.amcl.tracker import Track, Tracker
+from firstfix.belief.view import View
 from firstfix.core.errors import InputError
 from firstfix.core.grid import OccupancyGrid
 from firstfix.core.scan import LaserScan
 from firstfix.core.se2 import SE2
 from firstfix.fields.map_fields import MapFields
 from firstfix.lab.experiments.drive import Drive, Sight
+from firstfix.localizer.checked_odometry import CheckedOdometry
 from firstfix.localizer.pose_fusion import SharpPose, sharpen
 
 
@@ -104,17 +106,21 @@ def follow_drive(
     """
     track: Track | None = None
     sharp: SharpPose | None = None
-    covariance = start_covariance
+    covariance, odometry = start_covariance, CheckedOdometry()
     for sight in drive.sights:
-        T_odom_base, scans, before = sight.T_odom_base, (sight.scan, *sight.others), track
+        scans, before = (sight.scan, *sight.others), track
         cpu = time.thread_time()
+        if sight.begin_at is not None:
+            odometry.restart()
+        view = odometry.check(View(scans, sight.T_odom_base))
+        T_odom_base = view.T_odom_base
         if sight.begin_at is not None:
             particles = around_pose(sight.begin_at, covariance, config.max_particles, rng)
             track = tracker.begin(particles, T_odom_base, scans, rng)
             covariance, sharp = TRUE_START, None
         else:
             assert track is not None  # noqa: S101 - the first scan of a drive has a start
-            track = tracker.follow(track, T_odom_base, scans, rng)
+            track = tracker.follow(track, T_odom_base, scans, rng, view.unconfirmed)
         T_map_odom, found = track.T_map_odom, track.state.estimate.covariance
         if fields is not None:
             filtered = SharpPose(T_map_odom @ T_odom_base, found, T_odom_base)
@@ -125,7 +131,7 @@ def follow_drive(
             sight=sight,
             T_map_base=T_map_odom @ T_odom_base,
             covariance=found,
-            T_map_odom=T_map_odom,
+            T_map_odom=T_map_odom @ odometry.T_checked_odom,
             updated=track is not before,
             particles=len(track.state.particles),
             elsewhere=track.state.elsewhere,
