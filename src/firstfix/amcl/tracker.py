@@ -14,8 +14,8 @@ from firstfix.amcl.sensor import Sensor
 from firstfix.core.scan import Scans
 from firstfix.core.se2 import SE2
 
-# Steps that two scans confirm are known twice as well; the alphas are variances. Chosen on fr079,
-# intel_lab and csail.
+# Steps that two scans confirm are known twice as well; the alphas are variances. Chosen on the real
+# drives of docs/experiments.md.
 _CONFIRMED_ALPHAS = 0.25
 
 

@@ -20,8 +20,8 @@ from firstfix.core.se2 import SE2
 from firstfix.global_localization.sensors import covered_angle
 
 # A step of the odometry that costs less is not doubted, and one of the scans that costs more is not
-# believed. All constants here were chosen on fr079 and intel_lab, and on drives of floors 3500 to
-# 3531 with the odometry as it is, mirrored, or turned by 3 to 15 degrees.
+# believed. All constants here were chosen on the real drives of docs/experiments.md, and on floors
+# 3500 to 3531 with the odometry as it is, mirrored, or turned by 3 to 15 degrees.
 _DOUBTFUL_COST, _GOOD_COST = 0.15, 0.25
 # Where nothing else fixes the step, scans follow a person who walks ahead and hides so much of the
 # view: another step must agree better than that of the odometry by more than this share.
