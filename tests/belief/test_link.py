@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from firstfix.belief.belief import begin, update
-from firstfix.belief.link import link
+from firstfix.belief.link import link, nearly_all_goes_on
 from firstfix.belief.view import Link, View
 from firstfix.core.estimate import Verdict
 from firstfix.core.se2 import SE2
@@ -27,7 +27,8 @@ SENSORS = pytest.mark.parametrize("lidar", [ALL_ROUND, WIDE])
 )
 def test_a_robot_that_drives_sees_what_it_saw_before(room, drive, lidar, step):
     before, now = drive(room.grid, START, [step], lidar)
-    assert link(before, now) == (Link.GOES_ON, True)
+    assert link(before, now) is Link.GOES_ON
+    assert nearly_all_goes_on(before, now)
 
 
 @SENSORS
@@ -35,28 +36,30 @@ def test_a_robot_that_drives_sees_what_it_saw_before(room, drive, lidar, step):
 def test_a_robot_that_is_carried_away_sees_something_else(room, drive, lidar, there):
     (before,) = drive(room.grid, START, [], lidar)
     (now,) = drive(room.grid, there, [], lidar)
-    assert link(before, now) == (Link.BROKEN, False)
-    assert link(now, before) == (Link.BROKEN, False)
+    assert link(before, now) is Link.BROKEN
+    assert not nearly_all_goes_on(before, now)
+    assert link(now, before) is Link.BROKEN
 
 
 @SENSORS
 def test_a_wheel_that_slips_is_no_kidnap(room, drive, lidar):
     before, now = drive(room.grid, START, [SE2(0.05, 0.0, math.radians(12.0))], lidar)
     slipped = dataclasses.replace(now, T_odom_base=before.T_odom_base @ SE2(0.05, 0.0, 0.0))
-    assert link(before, slipped)[0] is not Link.BROKEN
+    assert link(before, slipped) is not Link.BROKEN
 
 
 @pytest.mark.parametrize("step", [SE2(0.5, 0.0, 0.0), SE2(0.0, 0.0, 0.5)])
 def test_nothing_is_said_after_a_longer_way(room, drive, step):
     before, now = drive(room.grid, START, [step], ALL_ROUND)
-    assert link(before, now) == (Link.UNKNOWN, False)
+    assert link(before, now) is Link.UNKNOWN
+    assert not nearly_all_goes_on(before, now)
 
 
 def test_nothing_is_said_while_the_sensor_is_covered(room, drive):
     (before,) = drive(room.grid, START, [], ALL_ROUND)
     (scan,) = before.scans
     covered = dataclasses.replace(scan, ranges=np.full(len(scan), np.nan, np.float32))
-    assert link(before, View.of(covered, before.T_odom_base)) == (Link.UNKNOWN, False)
+    assert link(before, View.of(covered, before.T_odom_base)) is Link.UNKNOWN
 
 
 def test_a_few_people_break_nothing(room, drive):
@@ -65,7 +68,7 @@ def test_a_few_people_break_nothing(room, drive):
     ranges = scan.ranges.copy()
     ranges[:30] = np.minimum(ranges[:30], 0.8)
     crowded = dataclasses.replace(now, scans=(dataclasses.replace(scan, ranges=ranges),))
-    there, surely = link(before, crowded)
+    there, surely = link(before, crowded), nearly_all_goes_on(before, crowded)
     assert there is Link.GOES_ON
     assert not surely
 
@@ -76,8 +79,20 @@ def test_all_sensors_count(room, drive):
     two = View((*before.scans, *before.scans), before.T_odom_base)
     same = View((*now.scans, *now.scans), now.T_odom_base)
     mixed = View((*now.scans, *elsewhere.scans), now.T_odom_base)
-    assert link(two, same) == (Link.GOES_ON, True)
-    assert link(two, mixed) != (Link.GOES_ON, True)
+    assert link(two, same) is Link.GOES_ON
+    assert not (link(two, mixed) is Link.GOES_ON and nearly_all_goes_on(two, mixed))
+
+
+def test_a_step_that_scans_have_confirmed_goes_on_without_a_second_look(room, drive):
+    (before,) = drive(room.grid, START, [], ALL_ROUND)
+    (now,) = drive(room.grid, SE2(2.8, 2.5, 2.0), [], ALL_ROUND)
+    assert link(before, now) is Link.BROKEN
+    counted, next_one = (dataclasses.replace(view, unconfirmed=3) for view in (before, now))
+    assert link(counted, next_one) is Link.GOES_ON
+    assert not nearly_all_goes_on(counted, next_one)
+    assert link(counted, dataclasses.replace(now, unconfirmed=4)) is Link.BROKEN
+    far = SE2(1.0, 0.0, 0.0) @ before.T_odom_base
+    assert link(counted, dataclasses.replace(next_one, T_odom_base=far)) is Link.UNKNOWN
 
 
 # --- what the belief makes of it ---

@@ -42,7 +42,7 @@ _NEIGHBOURS = 2
 _WIDEST_GAP_RAD = math.radians(5.0)
 
 
-def link(before: View, now: View) -> tuple[Link, bool]:
+def link(before: View, now: View) -> Link:
     """Tell whether a view goes on where the one before ended.
 
     Each end point of one scan is compared with the beams of the other in its direction. Behind
@@ -57,21 +57,33 @@ def link(before: View, now: View) -> tuple[Link, bool]:
     -------
     Link
         UNKNOWN if too little of the views can be compared, or if wheels have slipped.
-    bool
-        True if nearly all beams agree: then the robot has not been carried, not even to a place
-        that looks similar.
     """
-    step = before.T_odom_base.inverse() @ now.T_odom_base
-    if math.hypot(step.x, step.y) > _MOST_M or abs(step.yaw) > _MOST_RAD:
-        return Link.UNKNOWN, False
+    step = _short_step(before, now)
+    if step is None:
+        return Link.UNKNOWN
+    if now.unconfirmed is not None and now.unconfirmed == before.unconfirmed:
+        return Link.GOES_ON  # laid on each other, the scans have confirmed the step
     share = agreeing(before, now, step)
     if math.isnan(share):
-        return Link.UNKNOWN, False
+        return Link.UNKNOWN
     if share >= _LEAST_AGREEING:
-        return Link.GOES_ON, share >= _NEARLY_ALL
+        return Link.GOES_ON
     slips = (agreeing(before, now, step @ SE2(0.0, 0.0, float(turn))) for turn in _SLIPS_RAD)
     has_slipped = any(slipped >= _LEAST_AFTER_SLIP for slipped in slips)
-    return (Link.UNKNOWN if has_slipped else Link.BROKEN), False
+    return Link.UNKNOWN if has_slipped else Link.BROKEN
+
+
+def nearly_all_goes_on(before: View, now: View) -> bool:
+    """Tell whether so many beams agree that the robot has not been carried to a similar place."""
+    step = _short_step(before, now)
+    return step is not None and agreeing(before, now, step) >= _NEARLY_ALL
+
+
+def _short_step(before: View, now: View) -> SE2 | None:
+    """Return the step of the odometry, unless it is too long to compare the views."""
+    step = before.T_odom_base.inverse() @ now.T_odom_base
+    is_long = math.hypot(step.x, step.y) > _MOST_M or abs(step.yaw) > _MOST_RAD
+    return None if is_long else step
 
 
 def agreeing(before: View, now: View, step: SE2) -> float:

@@ -90,9 +90,8 @@ _PARTS: Mapping[type[Any], Mapping[str, Any]] = {
         "_views_against": int,
         "_views_lost": int,
         "_fixes": dict[str, Prior],
-        "_before": View | None,
+        "_latest": tuple[View, ...],
         "_link": Link,
-        "_stays": bool,
         "belief": Belief,
     },
 }

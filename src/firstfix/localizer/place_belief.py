@@ -21,7 +21,7 @@ from firstfix.belief.belief import (
 from firstfix.belief.config import BeliefConfig
 from firstfix.belief.hints import Source
 from firstfix.belief.judge import MOST_MISSED, STAYING_PROBABILITY
-from firstfix.belief.link import link
+from firstfix.belief.link import link, nearly_all_goes_on
 from firstfix.belief.view import Link, View
 from firstfix.core.estimate import Hypothesis, Verdict
 from firstfix.core.scan import Scans, as_scans
@@ -94,9 +94,8 @@ class PlaceBelief:
         self._views_against = 0
         self._views_lost = 0  # in a row that neither the belief nor the monitor puts there
         self._fixes: dict[str, Prior] = {}  # by their source
-        self._before: View | None = None
+        self._latest: tuple[View, ...] = ()  # two of them
         self._link = Link.UNKNOWN  # of all scans since the latest view of the belief
-        self._stays = False  # nearly all of the newest scan goes on from the one before
         self.belief = begin(fields, None, config)
 
     @property
@@ -183,10 +182,8 @@ class PlaceBelief:
 
     def watch(self, view: View) -> None:
         """Compare each view with the one before: the robot may have been carried."""
-        now, self._stays = Link.UNKNOWN, False
-        if self._before is not None:
-            now, self._stays = link(self._before, view)
-        self._before = view
+        self._latest = (*self._latest[-1:], view)
+        now = link(*self._latest) if len(self._latest) > 1 else Link.UNKNOWN
         if now is Link.BROKEN:
             self._break_off()
         elif now is Link.UNKNOWN and self._link is Link.GOES_ON:
@@ -194,7 +191,7 @@ class PlaceBelief:
 
     def suspect_kidnap(self) -> None:
         """Take it that the robot may have been carried, unless the newest scan denies it."""
-        if not self._stays:
+        if len(self._latest) < 2 or not nearly_all_goes_on(*self._latest):
             self._break_off()
 
     def _break_off(self) -> None:
