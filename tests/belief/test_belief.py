@@ -110,6 +110,14 @@ def test_a_wrong_map_is_never_published(halls, room, drive):
 # --- laws ---
 
 
+def test_places_that_are_hardly_possible_are_held_but_not_counted(four_rooms, drive):
+    start = SE2(*four_rooms.grid.to_map(np.array([60.0, 60.0])).tolist(), 0.5)
+    views = drive(four_rooms.grid, start, [SE2(0.1, 0.0, 0.5)] * 12, WIDE)
+    beliefs = beliefs_of(views, four_rooms)
+    assert beliefs[-1].possible == 4
+    assert any(belief.possible < len(belief.probabilities) for belief in beliefs)
+
+
 def test_mass_sums_to_one(halls, drive):
     for belief in beliefs_of(drive(halls.grid, START, TURN), halls):
         assert belief.probabilities.sum() + belief.elsewhere == pytest.approx(1.0)

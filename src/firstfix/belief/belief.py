@@ -114,6 +114,11 @@ class Belief:
         return 1.0 - self.missed
 
     @property
+    def possible(self) -> int:
+        """Number of places that are still possible. More are held, to be compared with the best."""
+        return int(np.count_nonzero(self.probabilities >= NEGLIGIBLE))
+
+    @property
     def reason(self) -> str:
         """The verdict in words, for a person."""
         return self.judgement.reason

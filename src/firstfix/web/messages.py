@@ -254,7 +254,7 @@ def _belief(snapshot: Snapshot) -> BeliefSummary | None:
     belief = snapshot.belief
     if belief is None:
         return None
-    return BeliefSummary(len(belief.probabilities), belief.elsewhere)
+    return BeliefSummary(belief.possible, belief.elsewhere)
 
 
 def _simulation(status: SimulationStatus | None) -> Simulation | None:
