@@ -69,16 +69,7 @@ def lead(
 ) -> float:
     """Return how far the first place is ahead of the others, with one thing left out for each.
 
-    Parameters
-    ----------
-    tracks : Tracks
-        Most likely first; at least one.
-    window : sequence of Observation
-        The views, oldest first.
-    fields : MapFields
-        The prepared map.
-    config : BeliefConfig
-        Settings.
+    Arguments as in `leads`.
 
     Returns
     -------
