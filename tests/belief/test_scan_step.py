@@ -75,7 +75,7 @@ def test_a_robot_that_was_carried_away_has_not_slipped(room, drive, there):
     judged = judge_step(before, now)
     assert judged.by_scans is None
     assert not judged.is_confirmed
-    assert link(before, now)[0] is Link.BROKEN
+    assert link(before, now) is Link.BROKEN
 
 
 def corridor() -> OccupancyGrid:

@@ -26,12 +26,13 @@ from firstfix.global_localization.verify import beam_costs
 _THING_M = 1.5
 _CELLS = 3
 
-# Less than this is noise, nats: without the thing, places that look alike fit equally well.
-_LEAST_LEAD = 0.5
+# Without the thing the place must still be twenty times as likely as each other one, nats.
+_LEAST_LEAD = 3.0
 
 # What a beam costs where nothing has been moved, and little noise and few people are about. On
-# floors 3400 to 3423, wrong places that had nearly all of the probability cost 0.31 to 0.73.
-_UNCHANGED_COST = 0.25
+# floors 3400 to 3423 and 3632 to 3695, all wrong places but one that had nearly all of the
+# probability cost more.
+_UNCHANGED_COST = 0.2
 
 # Places, the best one included, that are compared.
 _COMPARED = 64
