@@ -41,7 +41,7 @@ _COMPARED = 64
 def leads(
     tracks: Tracks, window: Sequence[Observation], fields: MapFields, config: BeliefConfig
 ) -> bool:
-    """Tell whether the first place may be sure, however little of the map is still true.
+    """Tell whether the first place may be sure although the building may have changed.
 
     Parameters
     ----------

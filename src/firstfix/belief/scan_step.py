@@ -83,7 +83,7 @@ def judge_step(before: View, now: View) -> Step:
     is_long = math.hypot(by_odometry.x, by_odometry.y) > _LONGEST_M
     view_rad = min(FULL_TURN, sum(covered_angle(scan) for scan in now.scans))
     if is_long or abs(by_odometry.yaw) > _WIDEST_RAD or view_rad < _NARROWEST_RAD:
-        return Step(None, is_confirmed=False)
+        return _NOTHING_KNOWN
     pair, given = ScanPair(before.scans, now.scans), by_odometry.as_array()
     agreement = pair.agreement(given)
     least_gain = _PERSON_RAD / view_rad

@@ -306,7 +306,7 @@ def _is_shallow(
 
 @part
 def _note(details: NDArray[np.float64], k: int, i: int, cost: float, cause: float) -> None:
-    """Keep what one beam costs and where its cause is, if somebody asks for it."""
+    """Keep the cost of one beam and the distance of its cause, unless `details` is empty."""
     if details.size > 0:
         details[k, i, 0], details[k, i, 1] = cost, cause
 
